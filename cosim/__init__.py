@@ -1,0 +1,1 @@
+"""How FMUs are put together, run and looked at."""

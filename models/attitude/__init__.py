@@ -1,0 +1,1 @@
+"""Rotations, integration of rates, alignment and attitude estimators."""

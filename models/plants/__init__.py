@@ -1,0 +1,1 @@
+"""The mechanics that carry a sensor."""

@@ -1,0 +1,118 @@
+"""Scalar operations that serve floats and CasADi symbols alike, equal to the last bit.
+
+A model function calls these instead of `math`, so that one source runs as Python and is traced to C.
+Arithmetic operators and comparisons need no help; a choice that depends on a signal is `where`, never ``if``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+Scalar = Any  # float, or casadi.SX while tracing
+
+PI = math.pi
+_NUMBER = (float, int)
+
+
+def _symbols() -> Any:
+    import casadi  # only ever reached with symbols in hand
+
+    return casadi
+
+
+def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
+    """``a if condition else b`` for a comparison; both are evaluated, so make denominators and roots safe before.
+
+    The added zero turns -0.0 into 0.0, as CasADi's sum of two gated terms does.
+    """
+    if condition is True:
+        return a + 0.0
+    if condition is False:
+        return b + 0.0
+    return _symbols().if_else(condition, a, b)
+
+
+def both(a: Scalar, b: Scalar) -> Scalar:
+    """Logical and of two conditions."""
+    if isinstance(a, bool) and isinstance(b, bool):
+        return a and b
+    return _symbols().logic_and(a, b)
+
+
+def either(a: Scalar, b: Scalar) -> Scalar:
+    """Logical or of two conditions."""
+    if isinstance(a, bool) and isinstance(b, bool):
+        return a or b
+    return _symbols().logic_or(a, b)
+
+
+def sqrt(x: Scalar) -> Scalar:
+    return math.sqrt(x) if isinstance(x, _NUMBER) else x.sqrt()
+
+
+def sin(x: Scalar) -> Scalar:
+    return math.sin(x) if isinstance(x, _NUMBER) else x.sin()
+
+
+def cos(x: Scalar) -> Scalar:
+    return math.cos(x) if isinstance(x, _NUMBER) else x.cos()
+
+
+def exp(x: Scalar) -> Scalar:
+    return math.exp(x) if isinstance(x, _NUMBER) else x.exp()
+
+
+def log(x: Scalar) -> Scalar:
+    return math.log(x) if isinstance(x, _NUMBER) else x.log()
+
+
+def tanh(x: Scalar) -> Scalar:
+    return math.tanh(x) if isinstance(x, _NUMBER) else x.tanh()
+
+
+def atan2(y: Scalar, x: Scalar) -> Scalar:
+    if isinstance(y, _NUMBER) and isinstance(x, _NUMBER):
+        return math.atan2(y, x)
+    return _symbols().atan2(y, x)
+
+
+def floor(x: Scalar) -> Scalar:
+    return x // 1.0 if isinstance(x, _NUMBER) else x.floor()
+
+
+def absolute(x: Scalar) -> Scalar:
+    return abs(x) if isinstance(x, _NUMBER) else x.fabs()
+
+
+def hypot(x: Scalar, y: Scalar) -> Scalar:
+    """sqrt(x^2 + y^2), written out: libm's hypot rounds differently from platform to platform."""
+    return sqrt(x * x + y * y)
+
+
+def minimum(a: Scalar, b: Scalar) -> Scalar:
+    if isinstance(a, _NUMBER) and isinstance(b, _NUMBER):
+        return a if a < b else b
+    return _symbols().fmin(a, b)
+
+
+def maximum(a: Scalar, b: Scalar) -> Scalar:
+    if isinstance(a, _NUMBER) and isinstance(b, _NUMBER):
+        return a if a > b else b
+    return _symbols().fmax(a, b)
+
+
+def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
+    """x limited to low..high."""
+    return minimum(maximum(x, low), high)
+
+
+def round_half_up(x: Scalar) -> Scalar:
+    """Nearest whole number, halves upwards: floor(x + 1/2)."""
+    return floor(x + 0.5)
+
+
+def wrap(angle: Scalar) -> Scalar:
+    """Angle brought to -pi..pi, exact where it already lies there."""
+    turns = floor((angle + PI) / (2.0 * PI))
+    return angle - 2.0 * PI * turns

@@ -1,0 +1,195 @@
+"""Models as records and tasks, and the scheduler that runs them.
+
+A `Model` is five records and a few pure functions. Its tasks run at clocks of their own; tick k (k = 1, 2, ...) of a
+clock is at ``start_time + k * period``, counted and never accumulated, so that the result does not depend on how a
+master cuts time. A tick that falls on the end of a communication step belongs to that step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from .errors import ModelStoppedError
+from .noise import normals, stream_of
+from .record import check, flatten, leaves, unflatten
+
+TIME_TOLERANCE = 1e-9
+"""Seconds by which a tick may lie past the end of a step and still belong to it: masters add up rounded steps."""
+
+Step = Callable[[Any, Any, Any, Any, tuple[Any, ...]], Any]
+
+
+def _once(_coefficients: Any) -> int:
+    return 1
+
+
+def _no_rules(_parameters: Any, _instance: str) -> None:
+    return None
+
+
+class Clock(NamedTuple):
+    """A time base: its name and its period in seconds, read from the coefficients."""
+
+    name: str
+    period: Callable[[Any], Any]
+
+
+class Task(NamedTuple):
+    """A pure step ``(state, inputs, parameters, coefficients, normals) -> state`` that runs every n-th tick of a clock.
+
+    `step` is one function, or one for each value of the enumeration parameter that `choice` reads.
+    `normals` is the number of standard normal draws that a call takes.
+    """
+
+    name: str
+    clock: str
+    step: Step | Mapping[int, Step]
+    choice: Callable[[Any], int] | None = None
+    every: Callable[[Any], int] = _once
+    normals: int = 0
+
+    def chosen(self, parameters: Any) -> Step:
+        """The step that these parameters ask for."""
+        if callable(self.step):
+            return self.step
+        assert self.choice is not None
+        return self.step[int(self.choice(parameters))]
+
+    def alternatives(self) -> dict[str, Step]:
+        """Every step of the task by a name of its own."""
+        if callable(self.step):
+            return {self.name: self.step}
+        return {f"{self.name}_{value}": step for value, step in self.step.items()}
+
+
+class Model(NamedTuple):
+    """A simulated thing: its records, the functions that fill them, its clocks and tasks.
+
+    ==============  ==========================================================================
+    `coefficients`  ``(parameters) -> Coefficients``
+    `initial_state` ``(parameters, coefficients, inputs) -> State``
+    `outputs`       ``(state, parameters, coefficients) -> Outputs``
+    `seed`          ``(parameters) -> int``, the key of all its noise
+    `rules`         ``(parameters, instance)``, raises for values that do not go together
+    ==============  ==========================================================================
+    """
+
+    name: str
+    description: str
+    Parameters: type
+    Coefficients: type
+    Inputs: type
+    State: type
+    Outputs: type
+    coefficients: Callable[[Any], Any]
+    initial_state: Callable[[Any, Any, Any], Any]
+    outputs: Callable[[Any, Any, Any], Any]
+    clocks: Sequence[Clock]
+    tasks: Sequence[Task]
+    seed: Callable[[Any], int]
+    rules: Callable[[Any, str], None] = _no_rules
+
+
+class _Scheduled(NamedTuple):
+    name: str
+    step: Step
+    every: int
+    normals: int
+    key: tuple[int, int]
+
+
+class Snapshot(NamedTuple):
+    """All that evolves in a `Run`: the state's scalars and the clocks' counters."""
+
+    state: tuple[float, ...]
+    counts: tuple[int, ...]
+
+
+class Run:
+    """One simulated instance of a model from `start_time` on.
+
+    Raises `ValueRefusedError` for parameters or inputs out of range or out of step with one another.
+    """
+
+    def __init__(self, model: Model, parameters: Any, inputs: Any, start_time: float = 0.0, name: str = "") -> None:
+        self.model = model
+        self.name = name or model.name
+        self.start_time = start_time
+        self._set_parameters(parameters)
+        self.counts = [0] * len(model.clocks)
+        self._periods = [float(clock.period(self.coefficients)) for clock in model.clocks]
+        self._schedule()
+        try:
+            self.state = model.initial_state(parameters, self.coefficients, inputs)
+        except (ArithmeticError, ValueError) as error:
+            raise ModelStoppedError(f"{self.name}: no initial state: {error}") from error
+
+    def _set_parameters(self, parameters: Any) -> None:
+        check(self.model.Parameters, flatten(parameters), self.name)
+        self.model.rules(parameters, self.name)
+        try:
+            self.coefficients = self.model.coefficients(parameters)
+        except (ArithmeticError, ValueError) as error:
+            raise ModelStoppedError(f"{self.name}: no coefficients from these parameters: {error}") from error
+        self.parameters = parameters
+
+    def _schedule(self) -> None:
+        seed = int(self.model.seed(self.parameters))
+        self._due = [
+            self.start_time + (count + 1) * period for count, period in zip(self.counts, self._periods, strict=True)
+        ]
+        self._tasks = [
+            [
+                _Scheduled(
+                    task.name,
+                    task.chosen(self.parameters),
+                    int(task.every(self.coefficients)),
+                    task.normals,
+                    (seed, stream_of(task.name)),
+                )
+                for task in self.model.tasks
+                if task.clock == clock.name
+            ]
+            for clock in self.model.clocks
+        ]
+
+    def tune(self, parameters: Any) -> None:
+        """Go on with other values of tunable parameters; clocks and state stay."""
+        self._set_parameters(parameters)
+        self._schedule()
+
+    def advance(self, inputs: Any, until: float) -> None:
+        """Run every tick due by `until` (s) with `inputs` held; what was reached before an error is kept."""
+        limit = until + TIME_TOLERANCE
+        due, counts, parameters, coefficients = self._due, self.counts, self.parameters, self.coefficients
+        while (time := min(due)) <= limit:
+            clock = due.index(time)
+            count = counts[clock] + 1
+            state = self.state
+            for task in self._tasks[clock]:
+                if count % task.every == 0:
+                    drawn = normals(task.key, count // task.every, task.normals) if task.normals else ()
+                    try:
+                        state = task.step(state, inputs, parameters, coefficients, drawn)
+                    except (ArithmeticError, ValueError) as error:
+                        raise ModelStoppedError(f"{self.name}: task {task.name} at t = {time} s: {error}") from error
+            self.state = state
+            counts[clock] = count
+            due[clock] = self.start_time + (count + 1) * self._periods[clock]
+
+    def outputs(self) -> Any:
+        """What the model shows now."""
+        return self.model.outputs(self.state, self.parameters, self.coefficients)
+
+    def snapshot(self) -> Snapshot:
+        """A copy of all that evolves."""
+        return Snapshot(tuple(flatten(self.state)), tuple(self.counts))
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot of the same model."""
+        if len(snapshot.state) != len(leaves(self.model.State)) or len(snapshot.counts) != len(self.counts):
+            raise ModelStoppedError(f"{self.name}: the saved state is of another model or version")
+        self.state = unflatten(self.model.State, snapshot.state)
+        self.counts = list(snapshot.counts)
+        self._schedule()
