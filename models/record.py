@@ -5,7 +5,8 @@ Records nest, and fields may be tuples; the nesting is the structured FMI name::
 
     gyro.noise_density        a field of a record in a record
     gyro.bias[2]              the second of a tuple
-    gyro.axis[3].scale        a tuple of records
+    gyro.cross_axis[1,3]      a tuple of tuples
+    gyro[3].scale             a tuple of records
 
 Everything else (FMI variables, XML, C tables, reference pages, value checks) is derived from `leaves`.
 """
@@ -18,6 +19,7 @@ from functools import cache
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 from .errors import ValueRefusedError
+from .scalar import Scalar, where
 
 
 class Real(NamedTuple):
@@ -89,10 +91,10 @@ class Leaf(NamedTuple):
 _MISSING = object()
 
 
-def _fields(record: type) -> list[tuple[str, Any, Any]]:
-    defaults = getattr(record, "_field_defaults")
+def _fields(record: Any) -> list[tuple[str, Any, Any]]:
+    defaults = record._field_defaults
     hints = get_type_hints(record, include_extras=True)
-    return [(name, hints[name], defaults.get(name, _MISSING)) for name in getattr(record, "_fields")]
+    return [(name, hints[name], defaults.get(name, _MISSING)) for name in record._fields]
 
 
 def _is_record(kind: Any) -> bool:
@@ -107,8 +109,9 @@ def _walk(prefix: str, kind: Any, fact: Fact | None, start: Any) -> Iterator[Lea
             value = getattr(start, name) if start is not _MISSING else default
             yield from _walk(f"{prefix}.{name}" if prefix else name, hint, fact, value)
     elif get_origin(kind) is tuple:
+        stem = f"{prefix[:-1]}," if prefix.endswith("]") else f"{prefix}["
         for i, element in enumerate(get_args(kind)):
-            yield from _walk(f"{prefix}[{i + 1}]", element, fact, start[i] if start is not _MISSING else _MISSING)
+            yield from _walk(f"{stem}{i + 1}]", element, fact, start[i] if start is not _MISSING else _MISSING)
     elif fact is None:
         raise TypeError(f"field {prefix} carries no FMI fact")
     else:
@@ -152,6 +155,14 @@ def _record_builder(record: type) -> Callable[[Iterator[Any]], Any]:
 def unflatten(record: type, values: Iterable[Any]) -> Any:
     """The record whose scalars are `values`, the inverse of `flatten`."""
     return _record_builder(record)(iter(values))
+
+
+def choose(condition: Scalar, a: Any, b: Any) -> Any:
+    """`where` for whole records and tuples: a's fields if the condition holds, else b's."""
+    chosen = [
+        choose(condition, x, y) if isinstance(x, tuple) else where(condition, x, y) for x, y in zip(a, b, strict=True)
+    ]
+    return a._make(chosen) if hasattr(a, "_make") else tuple(chosen)
 
 
 def defaults(record: type) -> Any:

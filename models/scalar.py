@@ -21,6 +21,10 @@ def _symbols() -> Any:
     return casadi
 
 
+def _is_symbol(x: Any) -> bool:
+    return hasattr(x, "is_symbolic")
+
+
 def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
     """``a if condition else b`` for a comparison; both are evaluated, so make denominators and roots safe before.
 
@@ -30,21 +34,23 @@ def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
         return a + 0.0
     if condition is False:
         return b + 0.0
-    return _symbols().if_else(condition, a, b)
+    if _is_symbol(condition):
+        return _symbols().if_else(condition, a, b)
+    return (a if condition else b) + 0.0
 
 
 def both(a: Scalar, b: Scalar) -> Scalar:
     """Logical and of two conditions."""
-    if isinstance(a, bool) and isinstance(b, bool):
-        return a and b
-    return _symbols().logic_and(a, b)
+    if _is_symbol(a) or _is_symbol(b):
+        return _symbols().logic_and(a, b)
+    return bool(a) and bool(b)
 
 
 def either(a: Scalar, b: Scalar) -> Scalar:
     """Logical or of two conditions."""
-    if isinstance(a, bool) and isinstance(b, bool):
-        return a or b
-    return _symbols().logic_or(a, b)
+    if _is_symbol(a) or _is_symbol(b):
+        return _symbols().logic_or(a, b)
+    return bool(a) or bool(b)
 
 
 def sqrt(x: Scalar) -> Scalar:

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from .record import Matrix3, Vector3
 from .scalar import Scalar, sqrt
 
 ZERO3: Vector3 = (0.0, 0.0, 0.0)
 IDENTITY3: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def each_axis(of: Callable[[int], Any]) -> tuple[Any, Any, Any]:
+    """of(0), of(1), of(2)."""
+    return of(0), of(1), of(2)
 
 
 def add(a: Vector3, b: Vector3) -> Vector3:
@@ -60,7 +68,7 @@ def multiply_transposed(m: Matrix3, a: Vector3) -> Vector3:
 def matrix_product(a: Matrix3, b: Matrix3) -> Matrix3:
     """A B."""
     columns = transpose(b)
-    return tuple(tuple(dot(row, column) for column in columns) for row in a)  # type: ignore[return-value]
+    return each_axis(lambda i: each_axis(lambda j: dot(a[i], columns[j])))
 
 
 def transpose(m: Matrix3) -> Matrix3:

@@ -125,5 +125,3 @@ def earth_rate_n(latitude: Scalar) -> Vector3:
 def wrapped(euler: Euler) -> Euler:
     """The same attitude with yaw and roll in -pi..pi and pitch in -pi/2..pi/2."""
     return euler_from_matrix(matrix_from_euler(euler))
-
-
