@@ -73,7 +73,8 @@ def inclination_errors(reference: Array, estimate: Array) -> Array:
     a, b = reference[:, 0], reference[:, 1:]
     real = w * a + np.sum(v * b, axis=1)
     up = (a[:, None] * v - w[:, None] * b - np.cross(v, b))[:, 2]
-    return 2.0 * np.arccos(np.clip(np.hypot(real, up), 0.0, 1.0))
+    errors: Array = 2.0 * np.arccos(np.clip(np.hypot(real, up), 0.0, 1.0))
+    return errors
 
 
 def inclination_rmse(recording: Recording, q_nb: Array) -> float:

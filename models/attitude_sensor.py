@@ -113,7 +113,7 @@ class Parameters(NamedTuple):
     ideal: Annotated[bool, Boolean("switch every error of the parts off and read them without delay")] = False
     seed: Annotated[int, Integer("key of all noise; equal seeds give equal noise", min=0)] = 1
     latitude: Annotated[float, Real("rad", "geographic latitude", min=-0.5 * PI, max=0.5 * PI, display="deg")] = (
-        52.5 * PI / 180.0
+        0.25 * PI
     )
     mounting: MountingParameters = MountingParameters()
     gyro: GyroParameters = GyroParameters()

@@ -53,5 +53,7 @@ def normals(key: tuple[int, int], call: int, count: int) -> tuple[float, ...]:
     drawn: tuple[float, ...] = ()
     for block in range((count + 3) // 4):
         a, b, c, d = philox4x64((call & _MASK, block, 0, 0), key)
-        drawn += _normal_pair(a, b) + _normal_pair(c, d)
+        drawn += _normal_pair(a, b)
+        if len(drawn) < count:
+            drawn += _normal_pair(c, d)
     return drawn[:count]

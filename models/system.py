@@ -162,18 +162,19 @@ class Run:
     def advance(self, inputs: Any, until: float) -> None:
         """Run every tick due by `until` (s) with `inputs` held; what was reached before an error is kept."""
         limit = until + TIME_TOLERANCE
-        due, counts, parameters, coefficients = self._due, self.counts, self.parameters, self.coefficients
+        due, counts, tasks = self._due, self.counts, self._tasks
+        parameters, coefficients = self.parameters, self.coefficients
         while (time := min(due)) <= limit:
             clock = due.index(time)
             count = counts[clock] + 1
             state = self.state
-            for task in self._tasks[clock]:
-                if count % task.every == 0:
-                    drawn = normals(task.key, count // task.every, task.normals) if task.normals else ()
+            for name, step, every, draws, key in tasks[clock]:
+                if count % every == 0:
+                    drawn = normals(key, count // every, draws) if draws else ()
                     try:
-                        state = task.step(state, inputs, parameters, coefficients, drawn)
+                        state = step(state, inputs, parameters, coefficients, drawn)
                     except (ArithmeticError, ValueError) as error:
-                        raise ModelStoppedError(f"{self.name}: task {task.name} at t = {time} s: {error}") from error
+                        raise ModelStoppedError(f"{self.name}: task {name} at t = {time} s: {error}") from error
             self.state = state
             counts[clock] = count
             due[clock] = self.start_time + (count + 1) * self._periods[clock]

@@ -15,9 +15,10 @@ low-passed gyro is the bias. The measurement noise grows with the velocity met l
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
-from ..record import Quaternion, Real, Vector3
+from ..record import Matrix3, Quaternion, Real, Vector3
 from ..scalar import Scalar, both, exp, minimum, where
 from ..vectors import add, dot, multiply, multiply_transposed, scale, subtract
 from .integration import turned
@@ -25,6 +26,7 @@ from .rotations import earth_rate_n, matrix_from_quaternion, normalised, quatern
 
 STATES = 7
 _PAIRS = tuple((i, j) for i in range(STATES) for j in range(i, STATES))
+_ROW = tuple(tuple(_PAIRS.index((min(i, j), max(i, j))) for j in range(STATES)) for i in range(STATES))
 Covariance = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float, float,
     float, float, float, float, float, float, float, float, float, float, float, float, float, float,
@@ -124,44 +126,58 @@ def _rest_after(
     return RestState(mean_rate, mean_force, where(quiet, minimum(rest.quiet + h, 2.0 * p.rest_time + 1.0), 0.0))
 
 
-Rows = list[list[Scalar]]
+Triangle = Sequence[Scalar]
 
 
-def _plus_scaled(row: list[Scalar], k: Scalar, other: list[Scalar]) -> list[Scalar]:
-    return [a + k * b for a, b in zip(row, other, strict=True)]
+def _row(p: Triangle, index: int) -> list[Scalar]:
+    return [p[n] for n in _ROW[index]]
 
 
-def _rows(covariance: Covariance) -> Rows:
-    rows: Rows = [[0.0] * STATES for _ in range(STATES)]
-    for (i, j), value in zip(_PAIRS, covariance, strict=True):
-        rows[i][j] = rows[j][i] = value
-    return rows
+def _predicted(p: Triangle, c_nb: Matrix3, f_up: Scalar, h: Scalar) -> list[Scalar]:
+    """Upper triangle of F P F' with F = I + h A: first the changed rows of G = F P, then G F'."""
+    phi_x, phi_y, v_x, v_y, b_x, b_y, b_z = [_row(p, index) for index in range(STATES)]
+    (xx, xy, xz), (yx, yy, yz), _ = c_nb
+    push = h * f_up
+    g0 = [a - h * (xx * u + xy * v + xz * w) for a, u, v, w in zip(phi_x, b_x, b_y, b_z, strict=True)]
+    g1 = [a - h * (yx * u + yy * v + yz * w) for a, u, v, w in zip(phi_y, b_x, b_y, b_z, strict=True)]
+    g2 = [a + push * b for a, b in zip(v_x, phi_y, strict=True)]
+    g3 = [a - push * b for a, b in zip(v_y, phi_x, strict=True)]
+    return [
+        g0[0] - h * (xx * g0[4] + xy * g0[5] + xz * g0[6]),
+        g0[1] - h * (yx * g0[4] + yy * g0[5] + yz * g0[6]),
+        g0[2] + push * g0[1],
+        g0[3] - push * g0[0],
+        *g0[4:],
+        g1[1] - h * (yx * g1[4] + yy * g1[5] + yz * g1[6]),
+        g1[2] + push * g1[1],
+        g1[3] - push * g1[0],
+        *g1[4:],
+        g2[2] + push * g2[1],
+        g2[3] - push * g2[0],
+        *g2[4:],
+        g3[3] - push * g3[0],
+        *g3[4:],
+        *b_x[4:],
+        *b_y[5:],
+        b_z[6],
+    ]
 
 
-def _predicted(covariance: Covariance, c_nb: tuple[Vector3, ...], f_up: Scalar, h: Scalar) -> Rows:
-    """F P F' with F = I + h A."""
-    p = _rows(covariance)
-    for _ in range(2):  # rows, then columns of the symmetric result
-        phi_x, phi_y, v_x, v_y, b_x, b_y, b_z = p
-        turned_x, turned_y = phi_x, phi_y
-        for column, bias_row in ((0, b_x), (1, b_y), (2, b_z)):
-            turned_x = _plus_scaled(turned_x, -h * c_nb[0][column], bias_row)
-            turned_y = _plus_scaled(turned_y, -h * c_nb[1][column], bias_row)
-        moved_x = _plus_scaled(v_x, h * f_up, phi_y)
-        moved_y = _plus_scaled(v_y, -h * f_up, phi_x)
-        p = [list(column) for column in zip(turned_x, turned_y, moved_x, moved_y, b_x, b_y, b_z, strict=True)]
-    return p
-
-
-def _measured(p: Rows, x: list[Scalar], index: int, residual: Scalar, variance: Scalar) -> tuple[Rows, list[Scalar]]:
+def _measured(
+    p: Triangle, x: list[Scalar], index: int, residual: Scalar, variance: Scalar
+) -> tuple[list[Scalar], list[Scalar]]:
     """Scalar Kalman update of error state `index` by `residual` = measured - (predicted + x[index])."""
-    row = p[index]
+    row = _row(p, index)
     weight = 1.0 / (row[index] + variance)
     gain = [value * weight for value in row]
-    return [_plus_scaled(p[i], -gain[i], row) for i in range(STATES)], _plus_scaled(x, residual - x[index], gain)
+    surprise = residual - x[index]
+    return (
+        [value - gain[i] * row[j] for value, (i, j) in zip(p, _PAIRS, strict=True)],
+        [value + surprise * k for value, k in zip(x, gain, strict=True)],
+    )
 
 
-def fused_step(fused: Fused, rate: Vector3, force: Vector3, p: FusionParameters, latitude: Scalar, h: Scalar) -> Fused:
+def fused_step(fused: Fused, rate: Vector3, force: Vector3, a: FusionParameters, latitude: Scalar, h: Scalar) -> Fused:
     """One sample of rate and specific force as read; the rate is taken as the mean since the sample before."""
     q, bias, fusion = fused
     earth = multiply_transposed(matrix_from_quaternion(q), earth_rate_n(latitude))
@@ -174,31 +190,30 @@ def fused_step(fused: Fused, rate: Vector3, force: Vector3, p: FusionParameters,
     vx, vy = v[0] + h * f_n[0], v[1] + h * f_n[1]
     memory = 1.0 - exp(-h / VELOCITY_MEMORY)
     lately = fusion.mean_square_velocity + memory * (vx * vx + vy * vy - fusion.mean_square_velocity)
-    rest = _rest_after(fusion.rest, rate, force, known, p, h)
-    resting = rest.quiet > p.rest_time
+    rest = _rest_after(fusion.rest, rate, force, known, a, h)
+    resting = rest.quiet > a.rest_time
 
-    rows = _predicted(fusion.covariance, c_nb, f_n[2], h)
-    tilt_noise = h * (p.gyro_noise * p.gyro_noise + p.rate_noise * p.rate_noise * dot(turn, turn))
-    bias_noise = h * p.bias_walk * p.bias_walk
-    for i in (0, 1):
-        rows[i][i] = rows[i][i] + tilt_noise
-    for i in (4, 5, 6):
-        rows[i][i] = rows[i][i] + bias_noise
+    p = _predicted(fusion.covariance, c_nb, f_n[2], h)
+    tilt_noise = h * (a.gyro_noise * a.gyro_noise + a.rate_noise * a.rate_noise * dot(turn, turn))
+    bias_noise = h * a.bias_walk * a.bias_walk
+    for index, noise in zip(
+        range(STATES), (tilt_noise, tilt_noise, 0.0, 0.0, bias_noise, bias_noise, bias_noise), strict=True
+    ):
+        p[_ROW[index][index]] = p[_ROW[index][index]] + noise
 
-    bound = p.velocity_bound * p.velocity_bound * (1.0 + p.velocity_adaptation * lately) / h
-    bound = bound * where(resting, p.rest_velocity, 1.0)
-    still = p.rest_rate_noise * p.rest_rate_noise / h * where(resting, 1.0, 1e12)
+    bound = a.velocity_bound * a.velocity_bound * (1.0 + a.velocity_adaptation * lately) / h
+    bound = bound * where(resting, a.rest_velocity, 1.0)
+    still = a.rest_rate_noise * a.rest_rate_noise / h * where(resting, 1.0, 1e12)
     x: list[Scalar] = [0.0] * STATES
-    rows, x = _measured(rows, x, 2, -vx, bound)
-    rows, x = _measured(rows, x, 3, -vy, bound)
+    p, x = _measured(p, x, 2, -vx, bound)
+    p, x = _measured(p, x, 3, -vy, bound)
     drift = subtract(rest.rate, known)
     for axis in range(3):
-        rows, x = _measured(rows, x, 4 + axis, drift[axis], still)
+        p, x = _measured(p, x, 4 + axis, drift[axis], still)
 
     q = normalised(quaternion_product((1.0, 0.5 * x[0], 0.5 * x[1], 0.0), q))
-    covariance = tuple(rows[i][j] for i, j in _PAIRS)
     return Fused(
         q,
         (bias[0] + x[4], bias[1] + x[5], bias[2] + x[6]),
-        FusionState((vx + x[2], vy + x[3]), lately, covariance, rest),
+        FusionState((vx + x[2], vy + x[3]), lately, tuple(p), rest),
     )

@@ -1,0 +1,159 @@
+"""Which Python sources go into an FMU, under which names, and the fingerprint of everything that it is made of.
+
+In the FMU the sources lie in a package named after the FMU and its fingerprint, because all FMUs of a process share
+``sys.modules``: another FMU, or another version of this one, must not be taken for it. Only what the model imports
+goes in.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.metadata
+import importlib.util
+import re
+from collections.abc import Iterator
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from typing import NamedTuple
+
+import pythonfmu  # type: ignore[import-untyped]
+
+from .catalogue import Entry
+from .errors import BuildError
+
+_PACKAGE = "attitude_fmu"
+_DISTRIBUTION = "attitude-fmu"
+_SLAVE = "attitude_fmu.fmu_src.slave"
+_HERE = Path(__file__).parent
+
+
+class Sources(NamedTuple):
+    """The sources of one FMU: package name in the FMU, name of its slave module, files by path, fingerprint."""
+
+    package: str
+    slave_module: str
+    files: dict[str, bytes]
+    fingerprint: str
+
+    @property
+    def guid(self) -> str:
+        """The fingerprint as FMI GUID."""
+        f = self.fingerprint
+        return f"{{{f[:8]}-{f[8:12]}-{f[12:16]}-{f[16:20]}-{f[20:32]}}}"
+
+
+def _spec(name: str) -> ModuleSpec | None:
+    try:
+        spec = importlib.util.find_spec(name)
+    except ModuleNotFoundError:
+        return None
+    return spec if spec is not None and spec.origin is not None else None
+
+
+def _imported(name: str, is_package: bool, tree: ast.AST) -> Iterator[str]:
+    """Names of the modules of ours that a module may import: ``from a import b`` means a and perhaps a.b."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            up = node.level - (1 if is_package else 0)
+            stem = name.rsplit(".", up)[0] if up else name
+            base = (f"{stem}.{node.module}" if node.module else stem) if node.level else str(node.module)
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def _closure(roots: list[str]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    waiting = list(roots)
+    while waiting:
+        name = waiting.pop()
+        spec = None if name in found else _spec(name)
+        if spec is None or spec.origin is None:
+            continue
+        found[name] = Path(spec.origin)
+        is_package = spec.submodule_search_locations is not None
+        tree = ast.parse(found[name].read_bytes())
+        waiting += [other for other in _imported(name, is_package, tree) if other.startswith(f"{_PACKAGE}.")]
+        waiting += [name.rsplit(".", 1)[0]] if name.count(".") > 1 else []
+    return found
+
+
+def _path_in_package(name: str, origin: Path) -> str:
+    path = name.removeprefix(f"{_PACKAGE}.").replace(".", "/")
+    return f"{path}/__init__.py" if origin.name == "__init__.py" else f"{path}.py"
+
+
+def _build_files() -> Iterator[tuple[str, Path]]:
+    """What an FMU is made with, besides the model."""
+    for path in sorted(_HERE.iterdir()):
+        if path.suffix in (".py", ".png"):
+            yield f"fmu_src/{path.name}", path
+    wrapper = Path(pythonfmu.__file__).parent
+    for path in sorted(wrapper.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            yield f"pythonfmu/{path.relative_to(wrapper).as_posix()}", path
+
+
+def version() -> str:
+    """Version of this package."""
+    return importlib.metadata.version(_DISTRIBUTION)
+
+
+def license_of(distribution: str = _DISTRIBUTION) -> str:
+    """Licence text of an installed distribution."""
+    metadata = importlib.metadata.distribution(distribution)
+    for name in ("licenses/LICENSE", "LICENSE", "licenses/LICENSE.txt", "LICENSE.txt"):
+        text = metadata.read_text(name)
+        if text:
+            return text
+    beside = Path(str(metadata.locate_file("LICENSE")))  # an editable install seen from its own folder
+    if beside.is_file():
+        return beside.read_text(encoding="utf-8")
+    raise BuildError(f"the installed package {distribution} has no licence text")
+
+
+def _fingerprint(entry: Entry, model_files: dict[str, Path]) -> str:
+    digest = hashlib.sha256(repr((tuple(entry), version(), license_of())).encode())
+    for name, path in [*sorted(model_files.items()), *_build_files()]:
+        content = path.read_bytes()
+        digest.update(f"{name}\0{len(content)}\0".encode())
+        digest.update(content)
+    return digest.hexdigest()
+
+
+def _slave_file(entry: Entry, package: str, fingerprint: str) -> str:
+    module = f"{package}.{entry.module.removeprefix(f'{_PACKAGE}.')}"
+    return f'''"""{entry.identifier}: what pythonfmu loads. The model is {module.replace(".", "/")}.py."""
+
+from {package}.fmu_src.slave import ModelSlave
+from {module} import MODEL
+
+
+class {entry.identifier}(ModelSlave):
+    model = MODEL
+    fingerprint = "{fingerprint}"
+
+    def __init__(self, **arguments):  # the wrapper needs a method here: see fmu_src/slave.py
+        super().__init__(**arguments)
+'''
+
+
+def sources_of(entry: Entry) -> Sources:
+    """The sources of one FMU as they are on disk now."""
+    if _spec(entry.module) is None:
+        raise BuildError(f"{entry.identifier}: there is no module {entry.module}")
+    modules = _closure([_SLAVE, entry.module])
+    fingerprint = _fingerprint(entry, modules)
+    snake = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", entry.identifier).lower()
+    package = f"{snake}_{fingerprint[:12]}"
+    renamed = re.compile(rf"\b{_PACKAGE}(?=\.)".encode())
+    files = {
+        f"{package}/{_path_in_package(name, origin)}": renamed.sub(package.encode(), origin.read_bytes())
+        for name, origin in modules.items()
+    }
+    files[f"{package}/__init__.py"] = f'"""Sources of {entry.identifier}, version {version()}."""\n'.encode()
+    slave_module = f"{package}_slave"
+    files[f"{slave_module}.py"] = _slave_file(entry, package, fingerprint).encode()
+    return Sources(package, slave_module, dict(sorted(files.items())), fingerprint)

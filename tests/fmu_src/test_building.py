@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from fmu_instance import EVERY_KIND
+
+from attitude_fmu.fmu_src.build import build, build_all, is_stale
+from attitude_fmu.fmu_src.catalogue import CATALOGUE, Entry
+from attitude_fmu.fmu_src.errors import BuildError
+from attitude_fmu.fmu_src.sources import sources_of
+
+SOURCE = Path(__file__).with_name("every_kind.py")
+
+
+def _names(archive: Path) -> list[str]:
+    with zipfile.ZipFile(archive) as fmu:
+        return fmu.namelist()
+
+
+@pytest.fixture
+def own_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Entry, Path]:
+    """A copy of the test model that may be changed."""
+    source = tmp_path / "own_model.py"
+    source.write_text(SOURCE.read_text())
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return Entry("OwnModel", "own_model"), source
+
+
+def test_the_same_sources_give_the_same_bytes_anywhere(fmu: Path, tmp_path: Path) -> None:
+    again = build(EVERY_KIND, tmp_path / "a folder with blanks" / "dist")
+    assert again.read_bytes() == fmu.read_bytes()
+
+
+def test_a_changed_source_changes_the_guid_and_the_module_names(own_model: tuple[Entry, Path], tmp_path: Path) -> None:
+    entry, source = own_model
+    before = sources_of(entry)
+    build(entry, tmp_path / "dist")
+    assert not is_stale(entry, tmp_path / "dist")
+    source.write_text(source.read_text().replace("0.9", "0.8"))
+    after = sources_of(entry)
+    assert is_stale(entry, tmp_path / "dist")
+    assert before.guid != after.guid
+    assert before.package != after.package
+    assert before.slave_module != after.slave_module
+
+
+def test_another_models_source_does_not_change_it() -> None:
+    files = sources_of(EVERY_KIND).files
+    assert not [name for name in files if "attitude_sensor" in name or "tripod" in name]
+
+
+def test_a_missing_or_broken_archive_is_stale(tmp_path: Path) -> None:
+    assert is_stale(EVERY_KIND, tmp_path)
+    (tmp_path / "EveryKind.fmu").write_bytes(b"PK, but not really")
+    assert is_stale(EVERY_KIND, tmp_path)
+
+
+def test_it_contains_what_fmi_asks_for(fmu: Path) -> None:
+    names = _names(fmu)
+    assert names[0] == "modelDescription.xml"
+    for wanted in (
+        "binaries/linux64/EveryKind.so",
+        "binaries/win64/EveryKind.dll",
+        "documentation/externalDependencies.txt",
+        "documentation/index.html",
+        "documentation/licenses/license.txt",
+        "model.png",
+        "resources/slavemodule.txt",
+    ):
+        assert wanted in names
+    assert not [name for name in names if "__pycache__" in name or "\\" in name]
+
+
+def test_binaries_are_executable(fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        for item in archive.infolist():
+            assert item.external_attr >> 16 == (0o100755 if item.filename.startswith("binaries/") else 0o100644)
+
+
+def test_the_reference_page_names_every_variable(fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        page = archive.read("documentation/index.html").decode()
+    for name in ("noise.density", "mounting[3,3]", "shown.level", "coefficient.sigma", "state.ticks"):
+        assert f"<td>{name}</td>" in page
+
+
+def test_sources_in_the_fmu_import_nothing_of_the_installed_package(fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        for name in archive.namelist():
+            if name.endswith(".py") and "/pythonfmu/" not in name:
+                text = archive.read(name).decode()
+                assert "attitude_fmu." not in text, name
+
+
+def test_many_may_build_at_once(fmu: Path, tmp_path: Path) -> None:
+    with ThreadPoolExecutor(3) as pool:
+        built = list(pool.map(lambda _: build(EVERY_KIND, tmp_path), range(3)))
+    assert {path.read_bytes() for path in built} == {fmu.read_bytes()}
+    assert [path.name for path in tmp_path.iterdir()] == ["EveryKind.fmu"]
+
+
+def test_a_model_that_does_not_build_leaves_the_old_fmu(own_model: tuple[Entry, Path], tmp_path: Path) -> None:
+    entry, source = own_model
+    dist = tmp_path / "dist"
+    before = build(entry, dist).read_bytes()
+    source.write_text(source.read_text().replace('"K"', '"degF"'))
+    with pytest.raises(BuildError, match="degF"):
+        build(entry, dist)
+    assert (dist / "OwnModel.fmu").read_bytes() == before
+    assert len(list(dist.iterdir())) == 1
+
+
+def test_an_unknown_name_is_refused_with_the_known_ones(tmp_path: Path) -> None:
+    with pytest.raises(BuildError, match="AttitudeSensor"):
+        build_all(tmp_path, ["Attitude"])
+
+
+def test_the_command_names_what_it_could_not_build() -> None:
+    command = Path(__file__).parents[2] / "build_fmu.py"
+    done = subprocess.run([sys.executable, str(command), "Nothing"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("there is no FMU called Nothing; there are AttitudeSensor")
+
+
+def test_only_stale_fmus_are_built(tmp_path: Path) -> None:
+    name = CATALOGUE[0].identifier
+    events: list[tuple[str, str]] = []
+    for _ in range(2):
+        paths = build_all(tmp_path, [name], lambda *event: events.append(event))
+    assert events == [(name, "building"), (name, "built"), (name, "up to date")]
+    assert paths == [tmp_path / f"{name}.fmu"]

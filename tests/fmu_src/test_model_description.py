@@ -1,0 +1,101 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+from fmu_instance import EVERY_KIND
+from lxml import etree
+
+from attitude_fmu.fmu_src.build import build
+from attitude_fmu.fmu_src.catalogue import CATALOGUE, Entry
+
+ALL = [EVERY_KIND, *CATALOGUE]
+
+
+@pytest.fixture(scope="module", params=ALL, ids=[entry.identifier for entry in ALL])
+def archive(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    entry: Entry = request.param
+    return build(entry, tmp_path_factory.mktemp("described"))
+
+
+def _xml(archive: Path) -> Any:
+    with zipfile.ZipFile(archive) as fmu:
+        return etree.fromstring(fmu.read("modelDescription.xml"))
+
+
+def test_fmpy_finds_nothing(archive: Path) -> None:
+    assert validate_fmu(str(archive)) == []
+
+
+def test_fmutool_finds_nothing(archive: Path) -> None:
+    code = "from fmu_manipulation_toolbox.cli.fmutool import fmutool; fmutool()"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "-input", str(archive), "-check"], capture_output=True, text=True, check=True
+    )
+    report = done.stdout + done.stderr
+    assert "compliant with FMI-2.0" in report
+    assert "No semantic error" in report
+    assert not [line for line in report.splitlines() if line.startswith(("WARN", "ERROR", "CRITICAL"))]
+
+
+def test_every_real_variable_has_a_defined_unit(archive: Path) -> None:
+    root = _xml(archive)
+    defined = {unit.get("name") for unit in root.find("UnitDefinitions")}
+    assert {real.get("unit") for real in root.iter("Real")} <= defined
+
+
+def test_every_variable_says_what_it_is(archive: Path) -> None:
+    for variable in _xml(archive).find("ModelVariables"):
+        assert variable.get("description")
+        assert variable.get("causality")
+        assert variable.get("variability")
+        assert variable.get("initial") or variable.get("causality") == "input"
+
+
+def test_outputs_depend_on_no_input_directly(archive: Path) -> None:
+    root = _xml(archive)
+    assert all(unknown.get("dependencies") == "" for unknown in root.find("ModelStructure/Outputs"))
+
+
+def test_initial_unknowns_are_in_order(archive: Path) -> None:
+    indices = [int(unknown.get("index")) for unknown in _xml(archive).find("ModelStructure/InitialUnknowns")]
+    assert indices == sorted(set(indices))
+
+
+def test_it_can_save_its_state_and_needs_no_tool(archive: Path) -> None:
+    flags = _xml(archive).find("CoSimulation").attrib
+    assert flags["needsExecutionTool"] == "false"
+    assert flags["canGetAndSetFMUstate"] == "true"
+    assert flags["canSerializeFMUstate"] == "true"
+    assert flags["canInterpolateInputs"] == "false"
+
+
+def test_start_values_come_back_exactly(fmu: Path) -> None:
+    description = read_model_description(str(fmu))
+    starts = {variable.name: variable.start for variable in description.modelVariables}
+    assert float(starts["noise.density"]) == 1e-3
+    assert starts["temperature"] == "298.15"
+    assert (starts["inverted"], starts["switch"], starts["shape"]) == ("false", "true", "1")
+
+
+def test_units_and_types_stand_in_the_description(fmu: Path) -> None:
+    root = _xml(fmu)
+    assert dict(root.find("UnitDefinitions/Unit[@name='rad/s']/BaseUnit").attrib) == {"s": "-1", "rad": "1"}
+    assert dict(root.find("UnitDefinitions/Unit[@name='K']/DisplayUnit").attrib) == {
+        "name": "degC",
+        "factor": "1.0",
+        "offset": "-273.15",
+    }
+    assert root.find("UnitDefinitions/Unit[@name='rad/(s.Hz^0.5)']/BaseUnit") is None
+    assert [item.get("name") for item in root.find("TypeDefinitions/SimpleType[@name='Shape']/Enumeration")] == [
+        "lag",
+        "mean",
+    ]
+    temperature = root.find("ModelVariables/ScalarVariable[@name='temperature']/Real").attrib
+    assert (temperature["min"], temperature["max"], temperature["displayUnit"]) == ("200.0", "400.0", "degC")
