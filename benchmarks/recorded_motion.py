@@ -13,10 +13,11 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from attitude_fmu.cosim import recorded_motion
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+
+from attitude_fmu.cosim import recorded_motion
 
 
 def errors_of(path: Path) -> tuple[str, float, float]:

@@ -1,1 +1,16 @@
-"""How FMUs are put together, run and looked at."""
+"""How FMUs are put together, run and looked at.
+
+=================  =================================================================================
+`system`           a coupled system: components, connections, parameter values; says whether it can run
+`ssp`              the same as files: ``.ssp`` archives and ``.ssv`` parameter sets
+`interface`        what an FMU offers: variables, types, units
+`master`           `simulate`: couples the FMUs and records them
+`recording`        results on disk while a run goes on, and as FMPy writes them
+`jobs`             several runs at a time, each in a process of its own
+`scenarios`        ready-made systems by name
+`report`           the numbers of a run
+`plot`             the picture of a run
+`recorded_motion`  recordings of real motion fed to an ideal sensor
+`command_line`     the command ``attitude-fmu``
+=================  =================================================================================
+"""

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from attitude_fmu.cosim import recorded_motion
 from scipy.spatial.transform import Rotation
 from vqf import VQF
+
+from attitude_fmu.cosim import recorded_motion
 
 FOLDER = os.environ.get("ATTITUDE_FMU_DATA")
 with_recordings = pytest.mark.skipif(not FOLDER, reason="ATTITUDE_FMU_DATA names no folder of recordings")

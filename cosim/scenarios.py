@@ -1,0 +1,130 @@
+"""Ready-made coupled systems, by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from .errors import SystemRefusedError, did_you_mean
+from .interface import Value
+from .system import Component, ParameterSet, System, connect
+
+LATITUDE = math.radians(52.5)
+"""rad, the place of every scenario: plant and sensor must agree on the Earth's rotation."""
+
+WIND_SPEED = 10.0
+"""m/s, a fresh breeze. In a light wind the tripod alone is steadier than what a loop closed through MEMS gyros can be:
+their white noise alone turns the line of sight by about 100 urad within a second."""
+
+EARTH_RATE = 7.292115e-5
+"""rad/s"""
+
+
+class Scenario(NamedTuple):
+    """A coupled system that the project offers.
+
+    `fmus` are the FMUs that it needs, `record` what is worth recording, `attitude` the true yaw, pitch and roll (rad)
+    where no component tells them.
+    """
+
+    name: str
+    description: str
+    fmus: tuple[str, ...]
+    system: Callable[[Path], System]
+    record: tuple[str, ...]
+    attitude: tuple[float, float, float] | None = None
+
+
+def gimbal(dist: Path) -> System:
+    """A camera on a three-axis gimbal on a windy tripod, stabilised from the attitude sensor on the camera."""
+    components = (
+        Component("plant", dist / "TripodGimbal.fmu"),
+        Component("sensor", dist / "AttitudeSensor.fmu"),
+        Component("controller", dist / "GimbalController.fmu"),
+    )
+    axes = ("yaw", "pitch", "roll")
+    joints = [f"{group}.{axis}" for group in ("joint", "joint_rate") for axis in axes]
+    euler = [f"euler.{axis}" for axis in axes]
+    connections = (
+        *connect("plant", "sensor", "rate[3]", "specific_force[3]", "angular_acceleration[3]", "temperature"),
+        *connect("plant", "sensor", ("euler.yaw", "heading_aid")),
+        *connect("sensor", "controller", *euler, ("rate_corrected[3]", "rate[3]"), ("aligned", "attitude_valid")),
+        *connect("plant", "controller", *joints),
+        *connect("controller", "plant", *[f"motor_torque.{axis}" for axis in axes]),
+    )
+    values: dict[str, Value] = {
+        "plant.latitude": LATITUDE,
+        "sensor.latitude": LATITUDE,
+        "plant.wind.speed": WIND_SPEED,
+    }
+    return System(
+        "gimbal",
+        components,
+        connections,
+        (ParameterSet("gimbal", values),),
+        stop_time=60.0,
+        description=gimbal.__doc__ or "",
+    )
+
+
+def static(dist: Path) -> System:
+    """The attitude sensor alone, level and at rest on a bench, its forward axis to the north."""
+    east, north, up = 0.0, EARTH_RATE * math.cos(LATITUDE), EARTH_RATE * math.sin(LATITUDE)
+    values: dict[str, Value] = {
+        "sensor.latitude": LATITUDE,
+        "sensor.rate[1]": east,
+        "sensor.rate[2]": north,
+        "sensor.rate[3]": up,
+        "sensor.specific_force[3]": 9.80665,
+    }
+    return System(
+        "static",
+        (Component("sensor", dist / "AttitudeSensor.fmu"),),
+        (),
+        (ParameterSet("static", values),),
+        stop_time=60.0,
+        description=static.__doc__ or "",
+    )
+
+
+_SENSOR = (
+    "sensor.euler.*",
+    "sensor.rate_measured*",
+    "sensor.rate_corrected*",
+    "sensor.specific_force_measured*",
+    "sensor.gyro_bias*",
+    "sensor.aligned",
+    "sensor.status",
+)
+_PLANT = (
+    "plant.euler.*",
+    "plant.rate*",
+    "plant.specific_force*",
+    "plant.joint.*",
+    "plant.tripod_deflection.*",
+    "plant.wind_speed",
+)
+
+SCENARIOS = (
+    Scenario(
+        "gimbal",
+        gimbal.__doc__ or "",
+        ("TripodGimbal", "AttitudeSensor", "GimbalController"),
+        gimbal,
+        (*_PLANT, *_SENSOR, "controller.motor_torque.*", "controller.status"),
+    ),
+    Scenario("static", static.__doc__ or "", ("AttitudeSensor",), static, _SENSOR, (0.0, 0.0, 0.0)),
+)
+
+
+def scenario_called(name: str) -> Scenario:
+    """The scenario of this name. Raises `SystemRefusedError` if there is none."""
+    known = {scenario.name: scenario for scenario in SCENARIOS}
+    if name not in known:
+        raise SystemRefusedError(
+            f"there is no scenario called {name!r}{did_you_mean(name, known)} "
+            f"(scenarios: {', '.join(known)}; or give an .ssp file)"
+        )
+    return known[name]

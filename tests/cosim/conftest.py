@@ -1,0 +1,29 @@
+"""FMUs that the tests of this room couple: small pythonfmu slaves, built once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from slave_building import build
+
+from attitude_fmu.cosim.system import Component, System, connect
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The test FMUs by the name of their file."""
+    folder = tmp_path_factory.mktemp("fmus")
+    sources = sorted((Path(__file__).parent / "slaves").glob("*.py"))
+    return {source.stem: build(source, folder / f"{source.stem}.fmu") for source in sources}
+
+
+@pytest.fixture
+def decay(fmus: dict[str, Path]) -> System:
+    """dx/dt = -x: an integrator and a gain in a loop."""
+    return System(
+        "decay",
+        (Component("integrator", fmus["integrator"]), Component("gain", fmus["gain"])),
+        (*connect("integrator", "gain", ("x", "u")), *connect("gain", "integrator", ("y", "u"))),
+        stop_time=1.0,
+    ).with_values("start", {"integrator.x0": 1.0})

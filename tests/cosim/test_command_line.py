@@ -1,0 +1,209 @@
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from attitude_fmu.cosim.command_line import application
+from attitude_fmu.cosim.interface import read_interface
+from attitude_fmu.cosim.recording import read_csv, write_csv
+from attitude_fmu.cosim.ssp import open_ssp, read_ssv, write_ssp
+from attitude_fmu.cosim.system import Component, System, check, start_values
+
+
+@pytest.fixture(scope="session")
+def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The project's FMUs, built once for these tests."""
+    folder = tmp_path_factory.mktemp("dist")
+    done = run("build", "--dist", str(folder))
+    assert done.exit_code == 0, done.stderr
+    return folder
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(application, list(arguments))
+
+
+def test_default_scenario_end_to_end(dist: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    settings = ("--set", "sensor.alignment.duration=0.2", "--set", "sensor.seed=7", "--set", "plant.wind.speed=3")
+    done = run("run", "--stop", "3.5", "--step", "0.002", "--out", str(out), "--dist", str(dist), *settings)
+    assert done.exit_code == 0, done.stderr
+    for text in ("sensor error, yaw", "jitter, loop on", "jitter, loop off", "real-time factor", "results.csv"):
+        assert text in done.stdout
+    names = {"results.csv", "loop_off.csv", "overview.png", "system.ssp", "parameters.ssv"}
+    assert {path.name for path in out.iterdir()} == names
+    results = read_csv(out / "results.csv")
+    assert results["time"][-1] == 3.5
+    assert len(results) == 1751
+    assert np.max(np.abs(results["sensor.euler.yaw"] - results["plant.euler.yaw"])) < 0.2
+    used = read_ssv(out / "parameters.ssv")
+    assert used.values["sensor.seed"] == "7"
+    assert used.values["controller.mode"] == "3"
+    assert len(used.values) > 100
+    with zipfile.ZipFile(out / "system.ssp") as archive:
+        texts = [archive.read(name).decode() for name in archive.namelist() if not name.endswith(".fmu")]
+    # other tools do not read them
+    assert not any("Enumeration" in text for text in texts)
+
+
+def test_written_system_and_parameters_give_the_same_run(dist: Path, tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    common = ("--stop", "0.3", "--step", "0.01", "--dist", str(dist))
+    done = run("run", "static", *common, "--out", str(first), "--set", "sensor.filter.kind=kalman")
+    assert done.exit_code == 0, done.stderr
+    with open_ssp(first / "system.ssp") as back:
+        values = {str(port): value for port, value in start_values(back, check(back)).items()}
+    assert values["sensor.filter.kind"] == 3
+    ours = ("--parameters", str(first / "parameters.ssv"), "--out", str(second))
+    done = run("run", str(first / "system.ssp"), *common, *ours)
+    assert done.exit_code == 0, done.stderr
+    before, after = read_csv(first / "results.csv"), read_csv(second / "results.csv")
+    assert all((before[name] == after[name]).all() for name in before.dtype.names)
+
+
+def test_step_of_communication_and_order_agree_at_rest(dist: Path, tmp_path: Path) -> None:
+    # constant inputs: the sensor's own clocks decide, not the master
+    ends = []
+    for number, choice in enumerate((("--step", "0.001"), ("--step", "0.01"), ("--master", "jacobi"))):
+        out = tmp_path / str(number)
+        done = run("run", "static", "--stop", "0.2", "--dist", str(dist), "--out", str(out), *choice)
+        assert done.exit_code == 0, done.stderr
+        ends.append(read_csv(out / "results.csv")[-1])
+    assert ends[0] == ends[1] == ends[2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (("run", "gimbl"), 1, "there is no scenario called 'gimbl'; did you mean gimbal?"),
+        (("run", "no.ssp"), 1, "file not found: no.ssp"),
+        (("run", "static", "--set", "seed=3"), 2, "write it as component.variable=value"),
+        (("run", "static", "--set", "sensor.sede=3"), 1, "AttitudeSensor has no variable 'sede'; did you mean seed?"),
+        (("run", "static", "--set", "sensor.solver.kind=gyros"), 1, "not one of levelling (1), gyro (2), fused (3)"),
+        (("run", "static", "--record", "sensor.eulr.*"), 1, "nothing to record is called sensor.eulr.*"),
+        (("run", "static", "--step", "0"), 1, "step = 0 s: a positive time is wanted"),
+        (("run", "static", "--out", "/proc/none"), 1, "cannot write into /proc/none"),
+        (("run", "--master", "newton"), 2, "newton"),
+        (("build", "AtitudeSensor"), 1, "AtitudeSensor"),
+        (("info", "none.fmu"), 1, "FMU not found: none.fmu"),
+    ],
+)
+def test_wrong_request_is_one_clear_line(
+    dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], code: int, message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    extra = () if arguments[0] == "info" else ("--dist", str(dist))
+    done = run(*arguments, *extra)
+    assert done.exit_code == code
+    assert message in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+
+
+def test_bad_value_is_refused_in_the_words_of_the_fmu(dist: Path, tmp_path: Path) -> None:
+    settings = ("--set", "sensor.temperature=25")
+    done = run("run", "static", "--stop", "0.1", "--out", str(tmp_path), "--dist", str(dist), *settings)
+    assert done.exit_code == 1
+    assert "returned fatal at t = 0 s: sensor.temperature = 25.0 K: too small, kelvin wanted" in done.stderr
+    assert len(done.stderr.split("attitude-fmu:")[1].strip().splitlines()) == 1
+
+
+def test_failing_fmu_leaves_its_results(fmus: dict[str, Path], tmp_path: Path) -> None:
+    system = System("t", (Component("motor", fmus["troublemaker"]),), stop_time=1.0)
+    path = write_ssp(system.with_values("way", {"motor.way": 1}), tmp_path / "t.ssp")
+    done = run("run", str(path), "--step", "0.1", "--out", str(tmp_path / "out"))
+    assert done.exit_code == 1
+    assert "motor: fmi2DoStep returned fatal at t = 0.5 s: the bearing has seized at 100% load" in done.stderr
+    assert "what was recorded until then is in" in done.stderr
+    assert len((tmp_path / "out" / "results.csv").read_text().splitlines()) == 7
+
+
+def test_crashing_fmu_leaves_its_results_and_nothing_older(fmus: dict[str, Path], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "overview.png").write_text("of an earlier run")
+    system = System("t", (Component("motor", fmus["troublemaker"]),), stop_time=1.0)
+    path = write_ssp(system.with_values("way", {"motor.way": 4}), tmp_path / "t.ssp")
+    done = run("run", str(path), "--step", "0.1", "--out", str(out))
+    assert done.exit_code == 1
+    assert "an FMU took the whole run down (code 139) after t = 0.5 s" in done.stderr
+    assert {file.name for file in out.iterdir()} == {"results.csv", "system.ssp", "parameters.ssv"}
+
+
+def test_own_ssp_gets_summary_table_picture_and_all_outputs(fmus: dict[str, Path], tmp_path: Path) -> None:
+    path = write_ssp(System("t", (Component("board", fmus["switchboard"]),), stop_time=1.0), tmp_path / "t.ssp")
+    done = run("run", str(path), "--step", "0.1", "--out", str(tmp_path / "o"), "--record", "board.enabled")
+    assert done.exit_code == 0, done.stderr
+    assert "board.level" in done.stdout
+    assert "board.enabled" in done.stdout
+    assert (tmp_path / "o" / "overview.png").is_file()
+
+
+def test_ctrl_c_says_so_and_keeps_the_results(dist: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "attitude_fmu.cosim.command_line", "run", "static", "--stop", "1000"]
+    options = ["--out", str(tmp_path), "--dist", str(dist), "--interval", "0.1"]
+    with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        spill = tmp_path / "results.partial.npy"
+        for _ in range(300):
+            if spill.is_file():
+                break
+            time.sleep(0.1)
+        time.sleep(1.0)
+        # as a terminal does: to the whole group
+        os.killpg(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=60.0)
+    assert process.returncode == 130
+    assert "stopped by the user at t = " in said
+    assert "Traceback" not in said
+    rows = read_csv(tmp_path / "results.csv")
+    assert len(rows) >= 1
+    assert not spill.exists()
+
+
+def test_version_and_help(dist: Path) -> None:
+    assert run("--version").stdout.startswith("attitude-fmu ")
+    shown = run("run", "--help").stdout
+    for text in ("Examples", "--set", "--master", "attitude-fmu run --stop 10", "overview.png"):
+        assert text in shown
+    for name in ("AttitudeSensor", "TripodGimbal", "GimbalController"):
+        assert read_interface(dist / f"{name}.fmu").variables
+    shown = run("info", "static", "--dist", str(dist), "--pattern", "solver").stdout
+    assert "sensor.solver.kind" in shown
+    assert "2 gyro" in shown
+
+
+def test_csv_of_a_run_is_what_fmpy_writes(dist: Path, tmp_path: Path) -> None:
+    done = run("run", "static", "--stop", "0.05", "--out", str(tmp_path), "--dist", str(dist))
+    assert done.exit_code == 0, done.stderr
+    results = read_csv(tmp_path / "results.csv")
+    write_csv(tmp_path / "again.csv", results, ["sensor.euler.yaw"])
+    fmpy.write_csv(tmp_path / "fmpy.csv", results, ["sensor.euler.yaw"])
+    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "fmpy.csv").read_bytes()
+
+
+def test_libcosim_runs_the_written_system_and_agrees(dist: Path, tmp_path: Path) -> None:
+    execution = pytest.importorskip("libcosimpy.CosimExecution")
+    observer = pytest.importorskip("libcosimpy.CosimObserver")
+    options = ("--stop", "0.2", "--master", "jacobi", "--out", str(tmp_path), "--dist", str(dist))
+    done = run("run", "gimbal", *options)
+    assert done.exit_code == 0, done.stderr
+    ours = read_csv(tmp_path / "results.csv")[-1]
+    theirs = execution.CosimExecution.from_ssp_file(ssp_path=str(tmp_path / "system.ssp"), step_size=1_000_000)
+    last = observer.CosimObserver.create_last_value()
+    theirs.add_observer(last)
+    theirs.step(200)
+    for name in ("plant.euler.pitch", "sensor.euler.roll", "controller.motor_torque.yaw"):
+        component, _, variable = name.partition(".")
+        index = theirs.slave_index_from_instance_name(component)
+        references = {found.name.decode(): found.reference for found in theirs.slave_variables(index)}
+        value = last.last_real_values(index, [references[variable]])[0]
+        assert value == pytest.approx(float(ours[name]), rel=1e-12)

@@ -1,0 +1,284 @@
+from __future__ import annotations
+
+import math
+import os
+import signal
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from slave_building import build
+
+from attitude_fmu.cosim.errors import ResultsError, RunStoppedError, SystemRefusedError
+from attitude_fmu.cosim.master import Order, simulate
+from attitude_fmu.cosim.recording import Recording, read_csv, rescue, write_csv
+from attitude_fmu.cosim.system import Component, System, connect
+
+JACOBI: Order = "jacobi"
+GAUSS_SEIDEL: Order = "gauss-seidel"
+
+
+def troublemaker(fmus: dict[str, Path], way: int) -> System:
+    system = System("trouble", (Component("motor", fmus["troublemaker"]),), stop_time=1.0)
+    return system.with_values("trouble", {"motor.way": way})
+
+
+def test_jacobi_takes_the_values_of_the_last_point(decay: System) -> None:
+    results = simulate(decay, step=0.1, order=JACOBI).results
+    x, y = [1.0], [-1.0]
+    for _ in range(10):
+        x, y = [*x, x[-1] + 0.1 * y[-1]], [*y, -x[-1]]
+    assert results["integrator.x"].tolist() == x
+    assert results["gain.y"].tolist() == y
+
+
+def test_gauss_seidel_takes_the_values_of_those_before(decay: System) -> None:
+    results = simulate(decay, step=0.1, order=GAUSS_SEIDEL).results
+    x = [1.0]
+    for _ in range(10):
+        x.append(x[-1] + 0.1 * -x[-1])
+    assert results["integrator.x"].tolist() == x
+    assert results["gain.y"].tolist() == [-value for value in x]
+
+
+@pytest.mark.parametrize("order", [JACOBI, GAUSS_SEIDEL])
+def test_coupling_error_halves_with_the_step(decay: System, order: Order) -> None:
+    def error(step: float) -> float:
+        return abs(float(simulate(decay, step=step, order=order).results["integrator.x"][-1]) - math.exp(-1.0))
+
+    coarse, fine = error(0.01), error(0.005)
+    assert fine < 4e-3
+    assert coarse / fine == pytest.approx(2.0, rel=0.05)
+
+
+def test_inputs_are_known_at_initialisation(fmus: dict[str, Path]) -> None:
+    # against the order of the components: the last one feeds the first
+    system = System(
+        "chain",
+        (
+            *(Component(name, fmus["gain"]) for name in ("third", "second", "first")),
+            Component("source", fmus["integrator"]),
+        ),
+        connect("source", "first", ("x", "u"))
+        + connect("first", "second", ("y", "u"))
+        + connect("second", "third", ("y", "u")),
+        stop_time=0.1,
+    ).with_values("start", {"source.x0": 2.0, "first.k": 3.0, "second.k": 5.0, "third.k": 7.0})
+    assert simulate(system, step=0.1).results["third.y"][0] == 210.0
+
+
+def test_loop_without_delay_settles_or_is_refused(fmus: dict[str, Path]) -> None:
+    loop = System(
+        "loop",
+        (Component("a", fmus["gain"]), Component("b", fmus["gain"])),
+        connect("a", "b", ("y", "u")) + connect("b", "a", ("y", "u")),
+        stop_time=1.0,
+    ).with_values("offset", {"a.c": 1.0, "b.c": 1.0})
+    settling = loop.with_values("gain", {"a.k": 0.5, "b.k": 0.5})
+    assert simulate(settling).results["a.y"][0] == pytest.approx(2.0, abs=1e-11)
+    growing = loop.with_values("gain", {"a.k": 2.0, "b.k": 2.0})
+    with pytest.raises(SystemRefusedError, match=r"do not settle.*a\.y -> b\.u.*break the loop"):
+        simulate(growing)
+
+
+def test_time_is_counted_not_accumulated(decay: System) -> None:
+    step = 0.001
+    results = simulate(decay, step=step).results
+    assert results["time"].tolist() == [k * step for k in range(1000)] + [1.0]
+    assert results["integrator.last_time"][1:].tolist() == [k * step for k in range(1000)]
+
+
+@pytest.mark.parametrize("step", [0.3, 0.0007, 1e-3, 1.0, 5.0])
+def test_run_ends_at_the_stop_time(decay: System, step: float) -> None:
+    results = simulate(decay, step=step, stop_time=1.0).results
+    assert results["time"][-1] == 1.0
+    assert len(results) == math.ceil(1.0 / step - 1e-9) + 1
+    assert np.all(np.diff(results["time"]) > 1e-5)
+
+
+def test_interval_thins_the_record_and_keeps_the_end(decay: System) -> None:
+    results = simulate(decay, step=0.01, stop_time=0.25, interval=0.1).results
+    assert results["time"] == pytest.approx([0.0, 0.1, 0.2, 0.25], abs=1e-12)
+    with pytest.raises(SystemRefusedError, match="multiple of the step"):
+        simulate(decay, step=0.01, interval=0.025)
+
+
+@pytest.mark.parametrize(("step", "stop"), [(0.0, 1.0), (math.nan, 1.0), (-1.0, 1.0), (0.1, 0.0), (0.1, math.inf)])
+def test_impossible_times_are_refused(decay: System, step: float, stop: float) -> None:
+    with pytest.raises(SystemRefusedError, match="wanted"):
+        simulate(decay, step=step, stop_time=stop)
+
+
+def test_record_takes_names_and_wildcards(decay: System) -> None:
+    names = simulate(decay, step=0.1, record=["integrator.*", "gain.u"]).results.dtype.names
+    assert names == (
+        "time",
+        "integrator.x0",
+        "integrator.drive",
+        "integrator.u",
+        "integrator.x",
+        "integrator.last_time",
+        "gain.u",
+    )
+    with pytest.raises(
+        SystemRefusedError, match=r"nothing to record is called gain\.v; did you mean gain\.y or gain\.u"
+    ):
+        simulate(decay, step=0.1, record=["gain.v"])
+
+
+def test_switches_and_whole_numbers_travel(fmus: dict[str, Path], tmp_path: Path) -> None:
+    system = System(
+        "switches",
+        (Component("a", fmus["switchboard"]), Component("b", fmus["switchboard"])),
+        connect("a", "b", ("steps", "switch_in"), ("odd", "number_in")),
+        stop_time=0.4,
+    ).with_values("s", {"a.enabled": False, "b.label": "x y", "a.number_in": 7})
+    results = simulate(system, step=0.1, order=GAUSS_SEIDEL, results=tmp_path / "r.csv").results
+    assert results["a.steps"].tolist() == [0, 1, 2, 3, 4]
+    assert results["b.switch_seen"].tolist() == [False, True, True, True, True]
+    assert results["b.number_seen"].tolist() == [0, 1, 0, 1, 0]
+    assert results["a.number_seen"].tolist() == [0, 7, 7, 7, 7]
+    assert results["a.level"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    assert results.dtype["a.odd"] == np.bool_
+    assert results.dtype["a.steps"] == np.int32
+    assert (tmp_path / "r.csv").read_text().splitlines()[2] == "0.1,0.5,1,7,True,False,0.5,1,1,True,True"
+
+
+def test_fmpy_takes_the_results(decay: System, tmp_path: Path) -> None:
+    results = simulate(decay, step=0.01, results=tmp_path / "ours.csv").results
+    fmpy.write_csv(tmp_path / "fmpy.csv", results)
+    assert (tmp_path / "ours.csv").read_bytes() == (tmp_path / "fmpy.csv").read_bytes()
+    for read in (fmpy.read_csv, read_csv):
+        back = read(tmp_path / "ours.csv")
+        assert back["integrator.x"].tolist() == results["integrator.x"].tolist()
+
+
+def test_csv_with_switches_reads_back(fmus: dict[str, Path], tmp_path: Path) -> None:
+    system = System("s", (Component("a", fmus["switchboard"]),), stop_time=0.3)
+    results = simulate(system, step=0.1, results=tmp_path / "r.csv").results
+    back = read_csv(tmp_path / "r.csv")
+    assert back.dtype.names == results.dtype.names
+    assert all((back[name] == results[name]).all() for name in results.dtype.names or ())
+    assert back.dtype["a.odd"] == np.bool_
+    (tmp_path / "r.csv").write_text("nonsense")
+    with pytest.raises(ResultsError, match="cannot read results"):
+        read_csv(tmp_path / "r.csv")
+
+
+def test_csv_of_special_values_equals_that_of_fmpy(tmp_path: Path) -> None:
+    values = [0.0, -0.0, 1e16, 1e-5, 0.1 + 0.2, math.inf, math.nan, 5e-324, 123456789.0]
+    rows = np.zeros(len(values), [("time", "f8"), ("whole", "i4"), ("switch", "?"), ("single", "f4")])
+    rows["time"], rows["whole"], rows["switch"] = values, range(-4, 5), [True, False, True] * 3
+    columns = ["whole", "switch"]
+    write_csv(tmp_path / "ours.csv", rows, columns)
+    fmpy.write_csv(tmp_path / "fmpy.csv", rows, columns)
+    assert (tmp_path / "ours.csv").read_bytes() == (tmp_path / "fmpy.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("way", "message"),
+    [
+        (1, r"motor: fmi2DoStep returned fatal at t = 0\.5 s: .*the bearing has seized at 100% load"),
+        (2, r"motor: fmi2DoStep returned discard at t = 0\.5 s: step too long"),
+    ],
+)
+def test_failing_fmu_ends_the_run_with_its_own_words(
+    fmus: dict[str, Path], tmp_path: Path, way: int, message: str
+) -> None:
+    path = tmp_path / "results.csv"
+    with pytest.raises(RunStoppedError, match=message) as caught:
+        simulate(troublemaker(fmus, way), step=0.1, results=path)
+    assert caught.value.time == 0.5
+    assert caught.value.results["motor.y"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    assert len(path.read_text().splitlines()) == 7
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_run_goes_on_after_a_warning(fmus: dict[str, Path]) -> None:
+    outcome = simulate(troublemaker(fmus, 3), step=0.1)
+    assert outcome.results["time"][-1] == 1.0
+    assert outcome.warnings == ("motor: running warm",)
+
+
+def test_refused_start_value_names_variable_and_reason(fmus: dict[str, Path]) -> None:
+    with pytest.raises(SystemRefusedError, match=r"motor\.way = many: not a whole number"):
+        simulate(System("t", (Component("motor", fmus["troublemaker"]),)).with_values("v", {"motor.way": "many"}))
+
+
+def test_ctrl_c_keeps_the_results(fmus: dict[str, Path], tmp_path: Path) -> None:
+    def press(time: float) -> None:
+        if time > 0.35:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(RunStoppedError, match=r"stopped by the user at t = 0\.4 s") as caught:
+        simulate(troublemaker(fmus, 0), step=0.1, results=tmp_path / "r.csv", progress=press)
+    assert caught.value.interrupted
+    assert len((tmp_path / "r.csv").read_text().splitlines()) == 1 + 5
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_nothing_is_left_behind(decay: System, tmp_path: Path) -> None:
+    paths, modules = list(sys.path), set(sys.modules)
+    simulate(decay, step=0.1, workspace=tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    assert sys.path == paths
+    assert {"integrator", "gain"}.isdisjoint(set(sys.modules) - modules)
+
+
+def test_rebuilt_fmu_runs_its_new_code(fmus: dict[str, Path], tmp_path: Path) -> None:
+    results = []
+    for rate in (1.0, 2.0):
+        source = tmp_path / str(rate) / "ramp.py"
+        source.parent.mkdir()
+        text = (Path(__file__).parent / "slaves" / "integrator.py").read_text()
+        source.write_text(text.replace("Integrator", "Ramp").replace("self.u + self.drive", str(rate)))
+        fmu = build(source, source.with_suffix(".fmu"))
+        results.append(float(simulate(System("r", (Component("r", fmu),)), stop_time=1.0).results["r.x"][-1]))
+    assert results == pytest.approx([1.0, 2.0])
+
+
+def test_runs_in_threads_do_not_touch_signals(decay: System) -> None:
+    ends: list[float] = []
+
+    def work() -> None:
+        ends.append(float(simulate(decay, step=0.1).results["integrator.x"][-1]))
+
+    threads = [threading.Thread(target=work) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(ends) == 2
+    assert ends[0] == ends[1]
+
+
+def test_folder_with_a_difficult_name_is_avoided(
+    decay: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    difficult = tmp_path / "ü [a] b"
+    difficult.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(difficult))
+    assert simulate(decay, step=0.1).results["time"][-1] == 1.0
+    with pytest.raises(ResultsError, match="plain name"):
+        simulate(decay, step=0.1, workspace=difficult)
+
+
+def test_unwritable_results_are_reported_before_the_run(decay: System, tmp_path: Path) -> None:
+    with pytest.raises(ResultsError, match="cannot keep"):
+        simulate(decay, step=0.1, results=tmp_path / "missing" / "r.csv")
+
+
+def test_rows_of_a_crashed_run_can_be_rescued(tmp_path: Path) -> None:
+    path = tmp_path / "r.partial.npy"
+    recording = Recording(np.dtype([("time", "f8"), ("y", "f8")]), 1000, path)
+    recording.rows["y"][:3] = [1.0, 2.0, 3.0]
+    recording.times[:3] = [0.0, 0.1, 0.2]
+    rows = rescue(path)
+    assert rows is not None
+    assert rows["y"].tolist() == [1.0, 2.0, 3.0]
+    assert rescue(path) is None
