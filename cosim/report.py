@@ -43,11 +43,17 @@ class AngleError(NamedTuple):
 
 
 class Jitter(NamedTuple):
-    """Motion of the line of sight within exposures (rad): rms over all of them, and rms of the worst one."""
+    """Motion of the line of sight (rad).
+
+    Within exposures: rms over all of them, and rms of the worst one. Over them all: `wander`, the rms about the mean
+    direction of the whole time, and `furthest` from it.
+    """
 
     rms: float
     worst: float
     exposures: int
+    wander: float
+    furthest: float
 
 
 class Spread(NamedTuple):
@@ -134,15 +140,23 @@ def jitter(results: Results, truth: str, since: float) -> Jitter | None:
     azimuth, elevation = line_of_sight(results, truth)
     number = np.floor((time - since + 1e-9) / EXPOSURE).astype(int)
     whole = int(np.floor((float(time[-1]) - since + 1e-9) / EXPOSURE))
-    squares = []
-    for exposure in range(whole):
-        inside = number == exposure
-        up = elevation[inside] - np.mean(elevation[inside])
-        across = np.cos(elevation[inside]) * (azimuth[inside] - np.mean(azimuth[inside]))
-        squares.append(float(np.mean(up**2 + across**2)))
-    if not squares:
+    if whole < 1:
         return None
-    return Jitter(float(np.sqrt(np.mean(squares))), float(np.sqrt(max(squares))), whole)
+    squares = [np.mean(_square_about_mean(azimuth, elevation, number == exposure)) for exposure in range(whole)]
+    away = _square_about_mean(azimuth, elevation, (number >= 0) & (number < whole))
+    return Jitter(
+        float(np.sqrt(np.mean(squares))),
+        float(np.sqrt(np.max(squares))),
+        whole,
+        float(np.sqrt(np.mean(away))),
+        float(np.sqrt(np.max(away))),
+    )
+
+
+def _square_about_mean(azimuth: Signal, elevation: Signal, inside: NDArray[np.bool_]) -> Signal:
+    up = elevation[inside] - np.mean(elevation[inside])
+    across = np.cos(elevation[inside]) * (azimuth[inside] - np.mean(azimuth[inside]))
+    return np.asarray(up**2 + across**2, np.float64)
 
 
 def spreads(results: Results, interfaces: Mapping[str, Interface]) -> tuple[Spread, ...]:
@@ -221,13 +235,22 @@ def table(numbers: Report, title: str, *, loop: bool = True) -> Any:
         values = (f"{np.degrees(error.rms):.4f}", f"{np.degrees(error.largest):.4f}")
         shown.add_row(f"sensor error, {error.axis}", *values, "deg")
     shown.add_section()
-    name = "line-of-sight jitter" + (", loop on" if loop else "")
-    for label, value in ((name, numbers.jitter), ("line-of-sight jitter, loop off", numbers.jitter_loop_off)):
-        if value is not None:
-            shown.add_row(label, f"{1e6 * value.rms:.1f}", f"{1e6 * value.worst:.1f}", "µrad")
+    for name, of in (("jitter", _jitter_of), ("wander", _wander_of)):
+        for state, value in ((", loop on" if loop else "", numbers.jitter), (", loop off", numbers.jitter_loop_off)):
+            if value is not None:
+                rms, largest = of(value)
+                shown.add_row(f"line-of-sight {name}{state}", f"{1e6 * rms:.1f}", f"{1e6 * largest:.1f}", "µrad")
     shown.add_section()
     shown.add_row("real-time factor", f"{numbers.real_time_factor:.2f}", "", "simulated / wall clock")
     return shown
+
+
+def _jitter_of(value: Jitter) -> tuple[float, float]:
+    return value.rms, value.worst
+
+
+def _wander_of(value: Jitter) -> tuple[float, float]:
+    return value.wander, value.furthest
 
 
 def _caption(numbers: Report) -> str:
@@ -241,7 +264,8 @@ def _caption(numbers: Report) -> str:
         count = f"{exposures} exposure{'s' if exposures > 1 else ''}"
         lines.append(
             f"Jitter: rms angle about the mean of each {EXPOSURE:g} s exposure, {count} "
-            f"from {numbers.aligned + SETTLING:g} s on; largest: the worst exposure."
+            f"from {numbers.aligned + SETTLING:g} s on; largest: the worst exposure.\n"
+            "Wander: rms angle about the mean of that whole time; largest: the furthest from it."
         )
         if numbers.jitter_loop_off is not None:
             lines.append("Loop off: the same run with the joints held, as on a plain head.")

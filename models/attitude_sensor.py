@@ -19,6 +19,7 @@ from .attitude.alignment import (
 )
 from .attitude.integration import runge_kutta_4
 from .attitude.rotations import (
+    REFERENCE_LATITUDE,
     STANDARD_GRAVITY,
     Euler,
     earth_rate_n,
@@ -113,7 +114,7 @@ class Parameters(NamedTuple):
     ideal: Annotated[bool, Boolean("switch every error of the parts off and read them without delay")] = False
     seed: Annotated[int, Integer("key of all noise; equal seeds give equal noise", min=0)] = 1
     latitude: Annotated[float, Real("rad", "geographic latitude", min=-0.5 * PI, max=0.5 * PI, display="deg")] = (
-        0.25 * PI
+        REFERENCE_LATITUDE
     )
     mounting: MountingParameters = MountingParameters()
     gyro: GyroParameters = GyroParameters()

@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from .attitude.rotations import (
+    REFERENCE_LATITUDE,
     STANDARD_GRAVITY,
     Euler,
     earth_rate_n,
@@ -92,7 +93,7 @@ class Parameters(NamedTuple):
         0.04,
     )  # on the camera's plate, assumption
     ambient_temperature: Annotated[float, Real("K", "of the air", 200.0, 400.0, "degC", 300.0)] = 293.15
-    latitude: Annotated[float, Real("rad", "geodetic, north positive", -PI / 2.0, PI / 2.0, "deg")] = PI / 4.0
+    latitude: Annotated[float, Real("rad", "geodetic, north positive", -PI / 2.0, PI / 2.0, "deg")] = REFERENCE_LATITUDE
     gravity: Annotated[float, Real("m/s2", "gravity where the tripod stands", 0.0, 30.0)] = STANDARD_GRAVITY
     solver_period: Annotated[float, Real("s", "step of the integration", 1e-6, 0.01, None, 1e-3)] = 1e-3
     seed: Annotated[int, Integer("key of all noise", 0, 2**31 - 1)] = 1

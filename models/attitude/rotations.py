@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from ..record import Matrix3, Quaternion, Real, Vector3
-from ..scalar import Scalar, atan2, cos, hypot, maximum, sin, sqrt, where
+from ..scalar import PI, Scalar, atan2, cos, hypot, maximum, sin, sqrt, where
 
 EARTH_RATE = 7.292115e-5
 """Rotation of the Earth, rad/s (WGS 84)."""
@@ -115,6 +115,10 @@ def quaternion_from_matrix(c: Matrix3) -> Quaternion:
 def tilt_from_specific_force(f_b: Vector3) -> tuple[Scalar, Scalar]:
     """Pitch and roll at rest: theta = atan2(fy, hypot(fx, fz)), gamma = atan2(-fx, fz)."""
     return atan2(f_b[1], hypot(f_b[0], f_b[2])), atan2(-f_b[0], f_b[2])
+
+
+REFERENCE_LATITUDE = 0.25 * PI
+"""rad, where every model stands unless told otherwise."""
 
 
 def earth_rate_n(latitude: Scalar) -> Vector3:

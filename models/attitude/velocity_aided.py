@@ -40,15 +40,15 @@ VELOCITY_MEMORY = 5.0
 class FusionParameters(NamedTuple):
     """Noise and bounds that the fused solution assumes (square roots of two-sided densities).
 
-    Gyro noise and bias walk are those of the ADXRS450 (N = D/sqrt(2), K = 0.87 s_min^2/N, with a margin); the others
-    are tuned on recorded hand motion (BROAD).
+    The gyro noise is the ADXRS450's with a margin (N = D/sqrt(2)); the bias walk stands for its flicker; the others
+    are tuned on recorded hand motion (BROAD). A body that cannot travel far wants a tighter `velocity_bound`.
     """
 
     gyro_noise: Annotated[float, Real("rad/s^0.5", "white noise of the rates", min=1e-9, tunable=True)] = 3e-4
     rate_noise: Annotated[
         float, Real("s^0.5", "further noise by rad/s of rate: scale, misalignment", min=0.0, tunable=True)
     ] = 0.015
-    bias_walk: Annotated[float, Real("rad/s^1.5", "random walk of the gyro bias", min=0.0, tunable=True)] = 7e-5
+    bias_walk: Annotated[float, Real("rad/s^1.5", "random walk of the gyro bias", min=0.0, tunable=True)] = 2e-4
     initial_bias: Annotated[float, Real("rad/s", "standard deviation of the bias at the start", min=0.0)] = 0.01
     initial_tilt: Annotated[
         float, Real("rad", "standard deviation of the tilt at the start", min=1e-9, display="deg")

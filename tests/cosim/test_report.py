@@ -69,6 +69,18 @@ def test_jitter_is_the_rms_about_the_mean_of_each_exposure() -> None:
     assert value.worst == pytest.approx(value.rms, rel=1e-3)
 
 
+def test_wander_is_the_rms_about_the_mean_of_all_exposures() -> None:
+    rows = results()
+    # a ramp of 6 urad over the six exposures from 4 s to 10 s: rms 6/sqrt(12), furthest 3
+    rows["plant.euler.pitch"] = 1e-6 * rows["time"]
+    rows["plant.euler.yaw"] = 0.0
+    value = jitter(rows, "plant", 4.0)
+    assert value is not None
+    assert value.wander == pytest.approx(6e-6 / math.sqrt(12.0), rel=1e-2)
+    assert value.furthest == pytest.approx(3e-6, rel=1e-2)
+    assert value.rms == pytest.approx(1e-6 / math.sqrt(12.0), rel=1e-2)
+
+
 def test_turning_through_north_is_no_jitter() -> None:
     rows = results()
     rows["plant.euler.yaw"] = wrapped(math.pi - 1e-6 + 2e-6 * (np.arange(len(rows)) % 2))
