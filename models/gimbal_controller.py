@@ -18,7 +18,7 @@ from typing import Annotated, NamedTuple
 
 from .attitude.rotations import Euler
 from .plants.gimbal import Axes
-from .record import Boolean, Enumeration, Integer, Item, Real, Vector3
+from .record import Boolean, Enumeration, Integer, Item, Real, Vector3, choose
 from .scalar import PI, Scalar, absolute, both, clip, cos, either, exp, maximum, sin, where, wrap
 from .system import Clock, Model, Task
 from .vectors import ZERO3, add, subtract
@@ -36,6 +36,16 @@ MODE = Enumeration(
         Item("stabilise", "attitude held as soon as it is valid, joints until then"),
     ),
     "what the gimbal does",
+)
+
+STATUS = Enumeration(
+    "GimbalStatus",
+    (
+        Item("off", "no torque"),
+        Item("joints_held", "joints held"),
+        Item("attitude_held", "attitude held"),
+    ),
+    "what the gimbal is doing",
 )
 
 
@@ -69,7 +79,7 @@ class Stabilise(NamedTuple):
 class Parameters(NamedTuple):
     """What the gimbal does, its inertias and its loops."""
 
-    mode: Annotated[int, MODE] = 3
+    mode: Annotated[int, MODE] = MODE.value("stabilise")
     period: Annotated[float, Real("s", "of the controller's clock", 1e-4, 0.1, nominal=1e-3)] = 1e-3
     inertia: Annotated[Axes, Real("kg.m2", "what the joint turns", 1e-6, 10.0, nominal=0.01, tunable=True)] = Axes(
         0.0079, 0.0056, 0.0023
@@ -116,7 +126,7 @@ class Outputs(NamedTuple):
     """Torques and what the controller is doing."""
 
     motor_torque: Annotated[Axes, Real("N.m", "on the joint; + turns its angle up", nominal=0.1)]
-    status: Annotated[int, Integer("1 off, 2 joints held, 3 attitude held", 1, 3)]
+    status: Annotated[int, STATUS]
     saturated: Annotated[bool, Boolean("a motor is at its limit")]
 
 
@@ -229,10 +239,6 @@ def _driven(state: State, demand: Demand, integral: Axes, p: Parameters) -> Stat
     )
 
 
-def _chosen(condition: Scalar, a: Axes, b: Axes) -> Axes:
-    return Axes(where(condition, a[0], b[0]), where(condition, a[1], b[1]), where(condition, a[2], b[2]))
-
-
 def _sum(a: Axes | Euler, b: Axes) -> Axes:
     return Axes(a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
@@ -244,7 +250,7 @@ def rest(state: State, _inputs: Inputs, _p: Parameters, _c: Coefficients, _norma
 
 def hold_joints(state: State, inputs: Inputs, p: Parameters, _c: Coefficients, _n: tuple[Scalar, ...]) -> State:
     """Joints at their first angles plus the setpoint."""
-    held = _chosen(state.ticks < 0.5, inputs.joint, state.held_joint)
+    held = choose(state.ticks < 0.5, inputs.joint, state.held_joint)
     demand = hold_demand(inputs, _sum(held, inputs.setpoint), p)
     return _driven(state._replace(held_joint=held), demand, state.integral, p)
 
@@ -254,19 +260,17 @@ def stabilise(state: State, inputs: Inputs, p: Parameters, c: Coefficients, _n: 
     valid, was = inputs.attitude_valid > 0.5, state.engaged > 0.5
     engaging = both(valid, state.engaged < 0.5)
     leaving = both(inputs.attitude_valid < 0.5, either(was, state.ticks < 0.5))
-    attitude = Euler(*_chosen(engaging, Axes(*inputs.euler), Axes(*state.held_attitude)))
-    joint = _chosen(leaving, inputs.joint, state.held_joint)
+    attitude = choose(engaging, inputs.euler, state.held_attitude)
+    joint = choose(leaving, inputs.joint, state.held_joint)
     rate, base = blended_rate(state, inputs, c)
     steady = stabilise_demand(inputs, rate, _sum(attitude, inputs.setpoint), p)
     held = hold_demand(inputs, joint, p)
-    demand = Demand(
-        _chosen(valid, steady.proportional, held.proportional), _chosen(valid, steady.integral_rate, held.integral_rate)
-    )
+    demand = choose(valid, steady, held)
     # at a change of loops the integral takes the torque's jump upon itself
     changing = either(engaging, both(leaving, was))
     jump = Axes(*[t - d for t, d in zip(state.torque, demand.proportional, strict=True)])
     after = state._replace(engaged=where(valid, 1.0, 0.0), held_attitude=attitude, held_joint=joint, base_rate=base)
-    return _driven(after, demand, _chosen(changing, jump, state.integral), p)
+    return _driven(after, demand, choose(changing, jump, state.integral), p)
 
 
 def outputs(state: State, p: Parameters, _c: Coefficients) -> Outputs:
