@@ -203,17 +203,16 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     def _compute(self, needs: int) -> None:
         run, interface, needs = self._current_run(), self._ports.interface, needs & self._stale
         if needs & OUTPUTS:
-            self._store(interface.outputs, run.outputs())
+            self._store(interface.outputs, run.shown())
         if needs & COEFFICIENTS:
-            self._store(interface.coefficients, run.coefficients)
+            self._store(interface.coefficients, flatten(run.coefficients))
         if needs & STATE:
-            self._store(interface.state, run.state)
+            self._store(interface.state, flatten(run.state))
         self._stale &= ~needs
 
-    def _store(self, place: slice, record: Any) -> None:
-        scalars = flatten(record)
+    def _store(self, place: slice, scalars: list[Any]) -> None:
         if len(scalars) != place.stop - place.start:
-            raise InterfaceError(f"{type(record).__name__} has {len(scalars)} scalars, not as declared")
+            raise InterfaceError(f"the model gave {len(scalars)} scalars for {place.stop - place.start} variables")
         self._values[place] = scalars
 
     # save and restore

@@ -27,12 +27,12 @@ from .attitude.rotations import (
     matrix_from_euler,
     matrix_from_quaternion,
 )
-from .attitude.velocity_aided import Fused, FusionParameters, FusionState, fused_step, initial_fusion
+from .attitude.velocity_aided import Fused, FusionParameters, FusionState, RestState, fused_step, initial_fusion
 from .errors import ValueRefusedError
 from .filters.kalman import KalmanParameters, kalman_filtered
 from .filters.rc import RcParameters, rc_filtered
 from .record import Boolean, Enumeration, Integer, Item, Matrix3, Quaternion, Real, Vector3, choose
-from .scalar import PI, Scalar, maximum, sqrt, where
+from .scalar import PI, Scalar, maximum, minimum, sqrt, where
 from .sensors import accelerometer as accelerometers
 from .sensors import bias_instability, devices
 from .sensors import gyro as gyros
@@ -102,7 +102,7 @@ class FilterParameters(NamedTuple):
     """The filter on the solved angles."""
 
     kind: Annotated[int, FILTER] = FILTER.value("none")
-    divider: Annotated[int, Integer("processor readings per filter step", min=1, max=100000)] = 1
+    divider: Annotated[int, Integer("readings per filter step; 10: the 2021 paper's 50 Hz", min=1, max=100000)] = 10
     from_zero: Annotated[bool, Boolean("start at zero, as the 2021 paper's filters do, not at the first angle")] = False
     rc: RcParameters = RcParameters()
     kalman: KalmanParameters = KalmanParameters()
@@ -134,6 +134,7 @@ class Coefficients(NamedTuple):
     slow_period: Annotated[float, Real("s", "time between steps of temperature and bias instability")]
     processor_period: Annotated[float, Real("s", "true time between readings of the registers")]
     alignment_samples: Annotated[float, Integer("readings averaged in the alignment")]
+    nulled_deviation: Annotated[float, Real("rad/s", "standard deviation of a bias nulled in the alignment")]
     filter_divider: Annotated[float, Integer("processor readings per filter step")]
 
 
@@ -160,7 +161,7 @@ class Inputs(NamedTuple):
 class SlowState(NamedTuple):
     """Temperatures and wandering offsets, stepped slowly."""
 
-    started: Annotated[float, Real("1", "1 once the bias instability has been drawn")]
+    started: Annotated[float, Boolean("the bias instability has been drawn")]
     gyro_instability: Annotated[bias_instability.Processes, Real("rad/s", "Gauss-Markov processes of the gyro biases")]
     accelerometer_instability: Annotated[
         bias_instability.Processes, Real("m/s2", "Gauss-Markov processes of the accelerometer biases")
@@ -181,7 +182,7 @@ class ReadingState(NamedTuple):
 class AttitudeState(NamedTuple):
     """The attitude solution."""
 
-    aligned: Annotated[float, Real("1", "1 once the alignment has ended")]
+    aligned: Annotated[float, Boolean("the alignment has ended")]
     alignment: AlignmentState
     q_nb: Annotated[Quaternion, Real("1", "attitude, body to navigation")]
     rate_before: Annotated[Vector3, Real("rad/s", "rate of the reading before", display="deg/s")]
@@ -192,7 +193,7 @@ class AttitudeState(NamedTuple):
 class FilterState(NamedTuple):
     """The filter on the angles."""
 
-    started: Annotated[float, Real("1", "1 once an angle has come in")]
+    started: Annotated[float, Boolean("an angle has come in")]
     euler: Euler
     variance: Annotated[Vector3, Real("rad2", "variance of the filtered angles")]
 
@@ -240,14 +241,17 @@ class Outputs(NamedTuple):
 def coefficients(p: Parameters) -> Coefficients:
     """Sensitivities, clock periods and noise levels of these parameters."""
     mounting = transpose(matrix_from_euler(p.mounting.rotation))
+    samples = samples_for(p.alignment.duration, p.processor.period)
+    averaged = p.solver.fusion.gyro_noise / sqrt(samples * p.processor.period)
     return Coefficients(
         C_sb=mounting,
         gyro=gyros.gyro_coefficients(p.gyro, mounting, p.ideal),
         accelerometer=accelerometers.accelerometer_coefficients(p.accelerometer, mounting, p.ideal),
-        slow_period=where(p.ideal > 0.5, gyros.STOPPED, SLOW_PERIOD),
+        slow_period=1.0 * SLOW_PERIOD,
         processor_period=p.processor.period / (1.0 + where(p.ideal > 0.5, 0.0, p.processor.clock_error)),
-        alignment_samples=samples_for(p.alignment.duration, p.processor.period),
-        filter_divider=1.0 * p.filter.divider,
+        alignment_samples=samples,
+        nulled_deviation=averaged,
+        filter_divider=where(p.filter.kind < 1.5, 1.0, 1.0 * p.filter.divider),
     )
 
 
@@ -300,7 +304,9 @@ def initial_state(p: Parameters, k: Coefficients, inputs: Inputs) -> State:
             q_nb=q_nb,
             rate_before=reading.rate,
             bias=ZERO3,
-            fusion=initial_fusion(p.solver.fusion, p.solver.fusion.initial_bias, reading.specific_force, ZERO3, 0.0),
+            fusion=initial_fusion(
+                p.solver.fusion, ZERO3, p.solver.fusion.initial_bias, 0.0, RestState(ZERO3, reading.specific_force, 0.0)
+            ),
         ),
         filter=FilterState(where(p.filter.from_zero > 0.5, 1.0, 0.0), filtered, (p.filter.kalman.R,) * 3),
     )
@@ -407,21 +413,34 @@ def acquire(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws
     return State(state.gyro, state.accelerometer, state.slow, reading, attitude, state.filter)
 
 
-def _aligning(attitude: AttitudeState, reading: ReadingState, inputs: Inputs, p: Parameters, k: Coefficients) -> Any:
-    """The attitude after one more reading at rest."""
+class _Start(NamedTuple):
+    """The solution that an alignment gives."""
+
+    q_nb: Quaternion
+    bias: Vector3
+    fusion: FusionState
+    alignment: AlignmentState
+
+
+def _aligning(
+    attitude: AttitudeState, reading: ReadingState, inputs: Inputs, p: Parameters, k: Coefficients
+) -> tuple[_Start, Scalar]:
+    """The start of the solution after one more reading at rest, and 1.0 once there are enough."""
     alignment = with_sample(attitude.alignment, reading.specific_force, reading.rate)
     q_nb = levelled(alignment.specific_force, inputs.heading_aid)
-    done = alignment.samples > k.alignment_samples - 0.5
-    nulled = nulled_bias(alignment, q_nb, p.latitude, p.alignment.null_gyro)
-    return alignment, q_nb, choose(done, nulled, ZERO3), where(done, 1.0, 0.0)
-
-
-def _bias_deviation(p: Parameters, k: Coefficients) -> Scalar:
-    """Standard deviation of the bias after the alignment: white noise averaged, or all of it."""
+    done = where(alignment.samples > k.alignment_samples - 0.5, 1.0, 0.0)
+    nulled, found = nulled_bias(alignment, q_nb, p.latitude, p.alignment)
+    mean = 1.0 / alignment.samples
+    rest = RestState(scale(mean, alignment.rate), scale(mean, alignment.specific_force), p.alignment.duration)
     fusion = p.solver.fusion
-    averaged = fusion.gyro_noise / sqrt(maximum(k.alignment_samples * p.processor.period, 1e-9))
-    both_known = where(averaged < fusion.initial_bias, averaged, fusion.initial_bias)
-    return where(p.alignment.null_gyro > 0.5, both_known, fusion.initial_bias)
+    fused = initial_fusion(
+        fusion,
+        nulled,
+        where(found > 0.5, minimum(k.nulled_deviation, fusion.initial_bias), fusion.initial_bias),
+        where(found > 0.5, 0.0, 3.0 * fusion.initial_bias),
+        rest,
+    )
+    return _Start(q_nb, choose(done > 0.5, nulled, ZERO3), fused, alignment), done
 
 
 Solution = tuple[Quaternion, Vector3, FusionState]
@@ -459,28 +478,11 @@ def _fused(attitude: AttitudeState, reading: ReadingState, p: Parameters) -> Sol
 def _solver(running: Callable[[AttitudeState, ReadingState, Parameters], Solution]) -> TaskStep:
     def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
         attitude, reading = state.attitude, state.reading
-        alignment, level, nulled, done = _aligning(attitude, reading, inputs, p, k)
-        mean = 1.0 / alignment.samples
-        start = initial_fusion(
-            p.solver.fusion,
-            _bias_deviation(p, k),
-            scale(mean, alignment.specific_force),
-            scale(mean, alignment.rate),
-            p.alignment.duration,
-        )
+        start, done = _aligning(attitude, reading, inputs, p, k)
         aligned = attitude.aligned > 0.5
-        q_nb, bias, fusion, sums = choose(
-            aligned,
-            (*running(attitude, reading, p), attitude.alignment),
-            (level, nulled, start, alignment),
-        )
+        now = choose(aligned, _Start(*running(attitude, reading, p), attitude.alignment), start)
         solved = AttitudeState(
-            where(aligned, 1.0, done),
-            sums,
-            q_nb,
-            attitude.rate_before,
-            bias,
-            fusion,
+            where(aligned, 1.0, done), now.alignment, now.q_nb, attitude.rate_before, now.bias, now.fusion
         )
         return State(state.gyro, state.accelerometer, state.slow, reading, solved, state.filter)
 
@@ -549,10 +551,11 @@ def outputs(state: State, _p: Parameters, _k: Coefficients) -> Outputs:
 
 def rules(p: Parameters, instance: str) -> None:
     """Raise `ValueRefusedError` where range and resolution do not fit the part's register word."""
-    for name, full_scale, resolution, codes in (
-        ("gyro", p.gyro.range, p.gyro.resolution, gyros.LARGEST_CODE),
-        ("accelerometer", p.accelerometer.range, p.accelerometer.resolution, accelerometers.LARGEST_CODE),
+    for name, full_scale, resolution, bits in (
+        ("gyro", p.gyro.range, p.gyro.resolution, gyros.WORD_LENGTH),
+        ("accelerometer", p.accelerometer.range, p.accelerometer.resolution, accelerometers.WORD_LENGTH),
     ):
+        codes = 2.0 ** (bits - 1)
         if full_scale > codes * resolution * (1.0 + 1e-9):
             raise ValueRefusedError(
                 f"{instance}.{name}.range",

@@ -73,10 +73,6 @@ def log(x: Scalar) -> Scalar:
     return math.log(x) if isinstance(x, _NUMBER) else x.log()
 
 
-def tanh(x: Scalar) -> Scalar:
-    return math.tanh(x) if isinstance(x, _NUMBER) else x.tanh()
-
-
 def atan2(y: Scalar, x: Scalar) -> Scalar:
     if isinstance(y, _NUMBER) and isinstance(x, _NUMBER):
         return math.atan2(y, x)
@@ -119,6 +115,6 @@ def round_half_up(x: Scalar) -> Scalar:
 
 
 def wrap(angle: Scalar) -> Scalar:
-    """Angle brought to -pi..pi, exact where it already lies there."""
+    """Angle brought to -pi (included) .. pi (not), exact where it already lies there."""
     turns = floor((angle + PI) / (2.0 * PI))
     return angle - 2.0 * PI * turns

@@ -8,14 +8,19 @@ master cuts time. A tick that falls on the end of a communication step belongs t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 from typing import Any, NamedTuple
 
-from .errors import ModelStoppedError
+from .errors import ModelStoppedError, ValueRefusedError
 from .noise import normals, stream_of
 from .record import check, flatten, leaves, unflatten
 
 TIME_TOLERANCE = 1e-9
-"""Seconds by which a tick may lie past the end of a step and still belong to it: masters add up rounded steps."""
+"""Part of the time (at least of 1 s) by which a tick may lie past the end of a step and still belong to it: masters
+add up rounded steps."""
+
+SHORTEST_PERIOD = 1e-6
+"""Shortest period of a clock, s; a shorter one is a slip that would keep a host busy for ever."""
 
 Step = Callable[[Any, Any, Any, Any, tuple[Any, ...]], Any]
 
@@ -109,6 +114,8 @@ class Snapshot(NamedTuple):
 class Run:
     """One simulated instance of a model from `start_time` on.
 
+    Ticks that fall on the very same time run in the order in which their clocks are declared.
+
     Raises `ValueRefusedError` for parameters or inputs out of range or out of step with one another.
     """
 
@@ -118,12 +125,24 @@ class Run:
         self.start_time = start_time
         self._set_parameters(parameters)
         self.counts = [0] * len(model.clocks)
-        self._periods = [float(clock.period(self.coefficients)) for clock in model.clocks]
+        self._periods = [self._period(clock) for clock in model.clocks]
         self._schedule()
         try:
             self.state = model.initial_state(parameters, self.coefficients, inputs)
         except (ArithmeticError, ValueError) as error:
             raise ModelStoppedError(f"{self.name}: no initial state: {error}") from error
+
+    def _period(self, clock: Clock) -> float:
+        period = float(clock.period(self.coefficients))
+        if not period >= SHORTEST_PERIOD:
+            raise ValueRefusedError(
+                f"{self.name}.{clock.name} clock's period",
+                period,
+                "s",
+                "the parameters give too short a period",
+                f"{SHORTEST_PERIOD} s or more",
+            )
+        return period
 
     def _set_parameters(self, parameters: Any) -> None:
         check(self.model.Parameters, flatten(parameters), self.name)
@@ -161,7 +180,7 @@ class Run:
 
     def advance(self, inputs: Any, until: float) -> None:
         """Run every tick due by `until` (s) with `inputs` held; what was reached before an error is kept."""
-        limit = until + TIME_TOLERANCE
+        limit = until + TIME_TOLERANCE * max(1.0, abs(until))
         due, counts, tasks = self._due, self.counts, self._tasks
         parameters, coefficients = self.parameters, self.coefficients
         while (time := min(due)) <= limit:
@@ -182,6 +201,18 @@ class Run:
     def outputs(self) -> Any:
         """What the model shows now."""
         return self.model.outputs(self.state, self.parameters, self.coefficients)
+
+    def shown(self) -> list[Any]:
+        """The scalars of `outputs`; raises `ModelStoppedError` where one is no finite number."""
+        scalars = flatten(self.outputs())
+        if not isfinite(sum(scalars)):
+            for leaf, value in zip(leaves(self.model.Outputs), scalars, strict=True):
+                if not isfinite(value):
+                    raise ModelStoppedError(
+                        f"{self.name}.{leaf.name} = {value}: the numbers ran away; "
+                        "look for parameters or inputs far from what the model is made for"
+                    )
+        return scalars
 
     def snapshot(self) -> Snapshot:
         """A copy of all that evolves."""

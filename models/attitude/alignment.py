@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from ..record import Boolean, Quaternion, Real, Vector3
-from ..scalar import Scalar, floor, maximum, where
-from ..vectors import multiply_transposed, scale, subtract
+from ..record import Boolean, Quaternion, Real, Vector3, choose
+from ..scalar import Scalar, absolute, both, floor, maximum, where
+from ..sensors.devices import ADXRS450
+from ..vectors import ZERO3, multiply_transposed, scale, subtract
 from .rotations import (
     Euler,
     earth_rate_n,
@@ -21,6 +22,9 @@ class AlignmentParameters(NamedTuple):
 
     duration: Annotated[float, Real("s", "time at rest over which the accelerometer is averaged", min=0.0)] = 2.0
     null_gyro: Annotated[bool, Boolean("take the mean rate at rest as gyro bias")] = True
+    largest_null: Annotated[
+        float, Real("rad/s", "mean rate that may still be bias; beyond it the body turns", min=0.0, display="deg/s")
+    ] = ADXRS450.null_accuracy.si
 
 
 class AlignmentState(NamedTuple):
@@ -57,8 +61,12 @@ def resting_bias(rate: Vector3, q_nb: Quaternion, latitude: Scalar) -> Vector3:
     return subtract(rate, multiply_transposed(matrix_from_quaternion(q_nb), earth_rate_n(latitude)))
 
 
-def nulled_bias(alignment: AlignmentState, q_nb: Quaternion, latitude: Scalar, enabled: Scalar) -> Vector3:
-    """Bias by the mean rate of the alignment where enabled, else zero."""
+def nulled_bias(
+    alignment: AlignmentState, q_nb: Quaternion, latitude: Scalar, p: AlignmentParameters
+) -> tuple[Vector3, Scalar]:
+    """Bias by the mean rate, and whether it could be had: zero where not asked for or where the body turns."""
     mean = scale(1.0 / maximum(alignment.samples, 1.0), alignment.rate)
     bias = resting_bias(mean, q_nb, latitude)
-    return where(enabled > 0.5, bias[0], 0.0), where(enabled > 0.5, bias[1], 0.0), where(enabled > 0.5, bias[2], 0.0)
+    largest = maximum(maximum(absolute(bias[0]), absolute(bias[1])), absolute(bias[2]))
+    found = both(p.null_gyro > 0.5, largest <= p.largest_null)
+    return choose(found, bias, ZERO3), where(found, 1.0, 0.0)

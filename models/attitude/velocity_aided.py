@@ -9,14 +9,16 @@ body, so that linear acceleration, which has no mean, hurts little.
 
 Error state: tilt phi_x, phi_y (navigation axes), velocity dv_x, dv_y, gyro bias db_x, db_y, db_z.
 At rest, seen by both triads staying close to their low-passed selves, the velocity is known much better and the
-low-passed gyro is the bias. The measurement noise grows with the velocity met lately, the tilt noise with the rate
-(scale and misalignment of real gyros). Own derivation; rest detection after Laidig & Seel, "VQF", 2023.
+low-passed gyro is the bias. A slow steady turn looks the same, so rest is believed only while the mean rate stays near
+the bias found in the alignment, which the filter cannot move. The measurement noise grows with the velocity met
+lately, the tilt noise with the rate (scale and misalignment of real gyros). Own derivation; rest detection after
+Laidig & Seel, "VQF", 2023.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from ..record import Matrix3, Quaternion, Real, Vector3
 from ..scalar import Scalar, both, exp, minimum, where
@@ -64,14 +66,20 @@ class FusionParameters(NamedTuple):
     ] = 1e-3
     rest_rate_noise: Annotated[
         float, Real("rad/s^0.5", "noise of the mean rate taken as bias at rest", min=1e-9, tunable=True)
-    ] = 1e-3
+    ] = 3e-3
     rest_rate: Annotated[
         float, Real("rad/s", "rate about its mean that still is rest", min=0.0, display="deg/s", tunable=True)
     ] = 0.035
     rest_bias: Annotated[
         float,
-        Real("rad/s", "mean rate about a well-known bias that still is rest", min=0.0, display="deg/s", tunable=True),
-    ] = 0.002
+        Real(
+            "rad/s",
+            "mean rate about the aligned bias still taken as rest; 0: none",
+            min=0.0,
+            display="deg/s",
+            tunable=True,
+        ),
+    ] = 1e-3
     rest_specific_force: Annotated[
         float, Real("m/s2", "specific force about its mean that still is rest", min=0.0, tunable=True)
     ] = 0.5
@@ -94,6 +102,8 @@ class FusionState(NamedTuple):
     mean_square_velocity: Annotated[float, Real("m2/s2", "mean squared velocity lately")]
     covariance: Annotated[Covariance, Real("1", "covariance of tilt, velocity and bias errors")]
     rest: RestState
+    anchor: Annotated[Vector3, Real("rad/s", "gyro bias found in the alignment", display="deg/s")]
+    doubt: Annotated[float, Real("rad/s", "how far from it the bias may be")]
 
 
 class Fused(NamedTuple):
@@ -105,31 +115,29 @@ class Fused(NamedTuple):
 
 
 def initial_fusion(
-    parameters: FusionParameters, bias_deviation: Scalar, force: Vector3, rate: Vector3, quiet: Scalar
+    a: FusionParameters, bias: Vector3, deviation: Scalar, doubt: Scalar, rest: RestState
 ) -> FusionState:
-    """The filter at the end of an alignment."""
-    tilt = parameters.initial_tilt * parameters.initial_tilt
+    """The filter at the end of an alignment that found `bias` with a standard `deviation`, sure within `doubt`."""
+    tilt = a.initial_tilt * a.initial_tilt
     speed = 0.1 * 0.1
-    bias = bias_deviation * bias_deviation
-    diagonal = (tilt, tilt, speed, speed, bias, bias, bias)
-    covariance = tuple(diagonal[i] if i == j else 0.0 for i, j in _PAIRS)
-    return FusionState((0.0, 0.0), 0.0, covariance, RestState(rate, force, quiet))  # type: ignore[arg-type]
+    variance = deviation * deviation
+    diagonal = (tilt, tilt, speed, speed, variance, variance, variance)
+    covariance: Any = tuple(diagonal[i] if i == j else 0.0 for i, j in _PAIRS)
+    return FusionState((0.0, 0.0), 0.0, covariance, rest, bias, doubt)
 
 
 def _rest_after(
     fusion: FusionState, rate: Vector3, force: Vector3, known: Vector3, a: FusionParameters, h: Scalar
 ) -> RestState:
-    """The means and the time of quiet after a sample; a mean rate within three sigma of the bias may be all bias."""
-    rest, p = fusion.rest, fusion.covariance
+    """The means and the time of quiet after a sample."""
+    rest = fusion.rest
     gain = 1.0 - exp(-h / a.rest_memory)
     mean_rate = add(rest.rate, scale(gain, subtract(rate, rest.rate)))
     mean_force = add(rest.specific_force, scale(gain, subtract(force, rest.specific_force)))
     turning, pushed, drift = subtract(rate, mean_rate), subtract(force, mean_force), subtract(mean_rate, known)
-    unknown = 9.0 * (p[_ROW[4][4]] + p[_ROW[5][5]] + p[_ROW[6][6]])
+    far = where(a.rest_bias > 0.0, a.rest_bias + fusion.doubt, 0.0)
     quiet = both(
-        both(
-            dot(turning, turning) < a.rest_rate * a.rest_rate, dot(drift, drift) < a.rest_bias * a.rest_bias + unknown
-        ),
+        both(dot(turning, turning) < a.rest_rate * a.rest_rate, dot(drift, drift) < far * far),
         dot(pushed, pushed) < a.rest_specific_force * a.rest_specific_force,
     )
     return RestState(mean_rate, mean_force, where(quiet, minimum(rest.quiet + h, 2.0 * a.rest_time + 1.0), 0.0))
@@ -199,7 +207,7 @@ def fused_step(fused: Fused, rate: Vector3, force: Vector3, a: FusionParameters,
     vx, vy = v[0] + h * f_n[0], v[1] + h * f_n[1]
     memory = 1.0 - exp(-h / VELOCITY_MEMORY)
     lately = fusion.mean_square_velocity + memory * (vx * vx + vy * vy - fusion.mean_square_velocity)
-    rest = _rest_after(fusion, rate, force, known, a, h)
+    rest = _rest_after(fusion, rate, force, add(fusion.anchor, earth), a, h)
     resting = rest.quiet > a.rest_time
 
     p = _predicted(fusion.covariance, c_nb, f_n[2], h)
@@ -224,5 +232,5 @@ def fused_step(fused: Fused, rate: Vector3, force: Vector3, a: FusionParameters,
     return Fused(
         q,
         (bias[0] + x[4], bias[1] + x[5], bias[2] + x[6]),
-        FusionState((vx + x[2], vy + x[3]), lately, tuple(p), rest),
+        FusionState((vx + x[2], vy + x[3]), lately, tuple(p), rest, fusion.anchor, fusion.doubt),
     )

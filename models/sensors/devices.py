@@ -12,6 +12,7 @@ from typing import NamedTuple
 from ..attitude.rotations import STANDARD_GRAVITY
 from ..record import Matrix3, Vector3
 from ..scalar import PI
+from ..vectors import scale
 
 _DEGREE = PI / 180.0
 _SI_FACTOR = {
@@ -33,7 +34,6 @@ _SI_FACTOR = {
     "ug/rtHz": 1e-6 * STANDARD_GRAVITY,
     "mg/degC": 1e-3 * STANDARD_GRAVITY,
     "LSB/g": 1.0 / STANDARD_GRAVITY,
-    "%/degC": 1e-2,
 }
 CELSIUS_ZERO = 273.15
 REFERENCE_TEMPERATURE = 25.0 + CELSIUS_ZERO
@@ -63,10 +63,13 @@ class GyroSheet(NamedTuple):
     range: Datum
     sensitivity: Datum
     noise_density: Datum
+    null_accuracy: Datum
     bias_stability: Datum
     bias_temperature_slope: Datum
     g_sensitivity: Datum
+    word_length: Datum
     resonator_frequency: Datum
+    samples_per_register: Datum
     demodulator_bandwidth: Datum
     self_heating: Datum
     warm_up: Datum
@@ -80,8 +83,9 @@ class AccelerometerSheet(NamedTuple):
     noise_density: Datum
     bias_stability: Datum
     offset_temperature_slope: Datum
-    sensitivity_temperature_slope: Datum
+    word_length: Datum
     sampling_frequency: Datum
+    decimations: Datum
     antialias_bandwidth: Datum
     first_stage_delay: Datum
     self_heating: Datum
@@ -92,10 +96,13 @@ ADXRS450 = GyroSheet(
     range=Datum(300.0, "deg/s", "Rev. 0 Table 1, guaranteed full scale"),
     sensitivity=Datum(80.0, "LSB/(deg/s)", "Rev. 0 Table 1"),
     noise_density=Datum(0.015, "deg/s/rtHz", "Rev. 0 Table 1, one-sided"),
+    null_accuracy=Datum(3.0, "deg/s", "Rev. 0 Table 1, typical column, over temperature"),
     bias_stability=Datum(25.0, "deg/h", "Rev. 0 p. 1, minimum of the root Allan variance"),
     bias_temperature_slope=Datum(0.003, "deg/s/degC", "Rev. 0 Figure 14, 16 parts over 150 degC", "figure"),
     g_sensitivity=Datum(0.03, "deg/s/g", "Rev. 0 Table 1"),
     resonator_frequency=Datum(16e3, "Hz", "Rev. 0 p. 11; 13 to 19 kHz by Table 10"),
+    word_length=Datum(16, "1", "Rev. 0 Table 9"),
+    samples_per_register=Datum(32, "1", "Rev. 0 p. 11: 500 Hz at f0 = 16 kHz; the window is four times as long"),
     demodulator_bandwidth=Datum(10.6e3, "Hz", "Rev. 0 p. 11, three blocks below 5 us each", "calculated"),
     self_heating=Datum(4.5, "K", "30 mW (Rev. 0 Table 1) through 150 K/W", "assumption"),
     warm_up=Datum(60.0, "s", "small board in still air", "assumption"),
@@ -105,10 +112,11 @@ ADXL355 = AccelerometerSheet(
     range=Datum(2.048, "g", "20-bit code at 256000 LSB/g", "calculated"),
     sensitivity=Datum(256_000.0, "LSB/g", "Rev. D Table 2, +-2 g"),
     noise_density=Datum(22.5, "ug/rtHz", "Rev. D Table 2, +-2 g, one-sided"),
-    bias_stability=Datum(3.5, "ug", "Rev. 0 Figure 56, Z axis", "figure"),
+    bias_stability=Datum(3.5, "ug", "Rev. 0 Figure 56, Z axis, as quoted in public code", "driver"),
     offset_temperature_slope=Datum(0.01, "mg/degC", "Rev. D Table 2, typical"),
-    sensitivity_temperature_slope=Datum(0.01, "%/degC", "Rev. D Table 2"),
+    word_length=Datum(20, "1", "Rev. D Table 2"),
     sampling_frequency=Datum(4000.0, "Hz", "Rev. D p. 25, first decimation"),
+    decimations=Datum(11, "1", "Rev. D p. 27, FILTER register [3:0] codes 0 to A, each half the rate before"),
     antialias_bandwidth=Datum(1500.0, "Hz", "Rev. D p. 25, analogue filter"),
     first_stage_delay=Datum(0.63, "ms", "Rev. D p. 26, delay at 4000 Hz"),
     self_heating=Datum(0.1, "K", "0.66 mW (Rev. D Table 2) through 150 K/W", "assumption"),
@@ -147,20 +155,23 @@ BOARD = Specimen(
     gyro_clock_error=_in_si((1.3, -0.8, 2.1), "%"),
     # null 0.33 +- 0.42 deg/s at 25 degC (Rev. 0 histograms, SOIC)
     gyro_bias=_in_si((0.52, -0.21, 0.38), "deg/s"),
-    gyro_bias_temperature_slope=_in_si((0.0022, -0.0013, 0.0028), "deg/s/degC"),
+    # shares of the slope read off Figure 14: assumption
+    gyro_bias_temperature_slope=scale(ADXRS450.bias_temperature_slope.si, (0.73, -0.43, 0.93)),
     # sensitivity 0.35 +- 0.42 % at 25 degC (Rev. 0 histograms, SOIC)
     gyro_scale_error=_in_si((0.41, -0.18, 0.64), "%"),
     # cross-axis +-3 % (Rev. 0 Table 1, typical column)
     gyro_cross_axis=_rows_in_si(((0.0, 0.9, -1.4), (-1.1, 0.0, 0.7), (1.6, -0.5, 0.0)), "%"),
-    # rows of length 0.03 deg/s/g (Rev. 0 Table 1), directions: assumption
-    gyro_g_sensitivity=_rows_in_si(
-        ((0.0180, -0.0216, 0.0106), (0.0096, 0.0240, -0.0153), (-0.0150, 0.0110, 0.0235)), "deg/s/g"
+    # each of the size in Table 1, directions: assumption
+    gyro_g_sensitivity=(
+        scale(ADXRS450.g_sensitivity.si, (0.60, -0.72, 0.35)),
+        scale(ADXRS450.g_sensitivity.si, (0.32, 0.80, -0.51)),
+        scale(ADXRS450.g_sensitivity.si, (-0.50, 0.37, 0.78)),
     ),
     # +-1.4 % device to device (Rev. D p. 25)
     accelerometer_clock_error=0.6 * _SI_FACTOR["%"],
     # 0 g offset +-25 mg typical (Rev. D Table 2)
     accelerometer_bias=_in_si((11.0, -7.0, 16.0), "mg"),
-    accelerometer_bias_temperature_slope=_in_si((0.010, -0.008, 0.012), "mg/degC"),
+    accelerometer_bias_temperature_slope=scale(ADXL355.offset_temperature_slope.si, (1.0, -0.8, 1.2)),
     # sensitivity within +-8 % (Rev. D Table 2 limits); well inside: assumption
     accelerometer_scale_error=_in_si((0.8, -0.5, 1.1), "%"),
     # cross-axis 1 % (Rev. D Table 2)

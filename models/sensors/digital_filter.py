@@ -14,10 +14,10 @@ from ..scalar import Scalar
 
 
 class BlockSums(NamedTuple):
-    """A, B and the number of samples of the block under way."""
+    """A, B and the number of samples of the block under way; whose block it is gives A and B their unit."""
 
-    a: Annotated[float, Real("1", "sum of the block's samples")]
-    b: Annotated[float, Real("1", "sum of the block's samples by their number")]
+    a: float
+    b: float
     samples: Annotated[float, Real("1", "samples in the block so far")]
 
 
@@ -36,11 +36,11 @@ def sinc2_decimated(rising: Scalar, a: Scalar, b: Scalar, n: Scalar) -> tuple[Sc
 
 
 class OverlappedWindows(NamedTuple):
-    """Partial sums of the three triangles under way when a sinc^2 of 2n is read every n samples."""
+    """Partial sums of the three triangles under way when a sinc^2 of 2n is read every n samples, begun one, two and three blocks ago."""
 
-    first: Annotated[float, Real("1", "window begun one block ago")]
-    second: Annotated[float, Real("1", "window begun two blocks ago")]
-    third: Annotated[float, Real("1", "window begun three blocks ago")]
+    first: float
+    second: float
+    third: float
 
 
 def sinc2_overlapped(windows: OverlappedWindows, a: Scalar, b: Scalar, n: Scalar) -> tuple[Scalar, OverlappedWindows]:

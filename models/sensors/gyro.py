@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
-from ..record import Integer, Matrix3, Real, Vector3
+from ..record import Boolean, Integer, Matrix3, Real, Vector3
 from ..scalar import Scalar, where
 from ..vectors import dot, each_axis, matrix_product
 from . import devices
@@ -28,14 +28,14 @@ from .sensitivity import sensitivity_matrix
 from .thermal import ThermalParameters
 from .white_noise import block_sums, sample_deviation
 
-SAMPLES_PER_SENSE = 8
-SENSES_PER_REGISTER = 4
-SAMPLES_PER_REGISTER = SAMPLES_PER_SENSE * SENSES_PER_REGISTER
-LARGEST_CODE = 2.0**15 - 1.0
 STOPPED = 1e12
 """Period of a clock that stands still, s: an ideal part is read directly."""
 
 _SHEET = devices.ADXRS450
+WORD_LENGTH = int(_SHEET.word_length.value)
+SAMPLES_PER_REGISTER = int(_SHEET.samples_per_register.value)
+SENSES_PER_REGISTER = 4
+SAMPLES_PER_SENSE = SAMPLES_PER_REGISTER // SENSES_PER_REGISTER
 _BOARD = devices.BOARD
 
 
@@ -56,7 +56,7 @@ class GyroParameters(NamedTuple):
         _SHEET.demodulator_bandwidth.si
     )
     resonator_frequency: Annotated[
-        float, Real("Hz", "nominal f0, from which every rate of the part follows", min=1e3)
+        float, Real("Hz", "nominal f0, from which every rate of the part follows", min=1e3, max=1e5)
     ] = _SHEET.resonator_frequency.si
     clock_error: Annotated[Vector3, Real("1", "relative error of f0", min=-0.25, max=0.25)] = _BOARD.gyro_clock_error
     bias: Annotated[Vector3, Real("rad/s", "null offset at 25 degC", display="deg/s")] = _BOARD.gyro_bias
@@ -90,10 +90,11 @@ class GyroState(NamedTuple):
     """One gyro."""
 
     rate: Annotated[float, Real("rad/s", "rate behind the analogue bandwidth")]
-    block: BlockSums
-    windows: OverlappedWindows
+    sensed: Annotated[float, Real("rad/s", "rate and what specific force adds to it, as last sensed")]
+    block: Annotated[BlockSums, Real("rad/s", "sums of the block under way")]
+    windows: Annotated[OverlappedWindows, Real("rad/s", "partial sums of the windows under way")]
     code: Annotated[float, Integer("rate register")]
-    over_range: Annotated[float, Real("1", "1 while the reading is beyond the range")]
+    over_range: Annotated[float, Boolean("reading beyond the range")]
 
 
 def gyro_coefficients(gyro: GyroParameters, mounting: Matrix3, ideal: Any) -> GyroCoefficients:
@@ -114,28 +115,31 @@ def gyro_coefficients(gyro: GyroParameters, mounting: Matrix3, ideal: Any) -> Gy
 def _register(
     gyro: GyroState, value: Scalar, block: BlockSums, windows: OverlappedWindows, parameters: GyroParameters
 ) -> GyroState:
-    code = register_code(value, parameters.range, parameters.resolution)
-    return GyroState(gyro.rate, block, windows, code, over_range(value, parameters.range))
+    code = register_code(value, parameters.range, parameters.resolution, WORD_LENGTH)
+    return GyroState(gyro.rate, gyro.sensed, block, windows, code, over_range(value, parameters.range))
 
 
 def initial_gyro(
     axis: int, rate: Vector3, force: Vector3, offset: Scalar, parameters: GyroParameters, k: GyroCoefficients
 ) -> GyroState:
     """The gyro after a long time at these inputs, without noise."""
-    sensed = dot(k.sensitivity[axis], rate)
-    pushed = sensed + dot(k.g_sensitivity[axis], force)
-    settled = settled_windows(pushed, float(SAMPLES_PER_REGISTER))
-    return _register(GyroState(sensed, EMPTY, settled, 0.0, 0.0), pushed + offset, EMPTY, settled, parameters)
+    passed = dot(k.sensitivity[axis], rate)
+    sensed = passed + dot(k.g_sensitivity[axis], force)
+    settled = settled_windows(sensed, float(SAMPLES_PER_REGISTER))
+    return _register(GyroState(passed, sensed, EMPTY, settled, 0.0, 0.0), sensed + offset, EMPTY, settled, parameters)
 
 
 def sense(axis: int) -> Callable[[GyroState, Vector3, Vector3, GyroCoefficients], GyroState]:
-    """Step of one gyro at f0/8: the true rate and specific force enter the block."""
+    """Step of one gyro at f0/8: the true rate and specific force enter the block.
+
+    The eight samples since the last step are taken at their mean, half way between what was sensed then and now.
+    """
 
     def step(gyro: GyroState, rate: Vector3, force: Vector3, k: GyroCoefficients) -> GyroState:
-        sensed = low_pass(gyro.rate, dot(k.sensitivity[axis], rate), k.low_pass_gain[axis])
-        pushed = sensed + dot(k.g_sensitivity[axis], force)
-        block = with_samples(gyro.block, pushed, float(SAMPLES_PER_SENSE))
-        return GyroState(sensed, block, gyro.windows, gyro.code, gyro.over_range)
+        passed = low_pass(gyro.rate, dot(k.sensitivity[axis], rate), k.low_pass_gain[axis])
+        sensed = passed + dot(k.g_sensitivity[axis], force)
+        block = with_samples(gyro.block, 0.5 * (gyro.sensed + sensed), float(SAMPLES_PER_SENSE))
+        return GyroState(passed, sensed, block, gyro.windows, gyro.code, gyro.over_range)
 
     return step
 

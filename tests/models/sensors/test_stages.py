@@ -18,6 +18,7 @@ from attitude_fmu.models.sensors import (
 )
 from attitude_fmu.models.sensors.bandwidth import low_pass, low_pass_gain
 from attitude_fmu.models.sensors.white_noise import block_sums
+from attitude_fmu.models.vectors import IDENTITY3, ZERO3
 
 
 def test_the_bandwidth_stage_has_its_corner_where_it_says() -> None:
@@ -108,12 +109,14 @@ def test_bias_instability_is_stationary_from_its_first_call_on() -> None:
 
 def test_register_codes_round_and_saturate() -> None:
     lsb = 1.0 / devices.ADXRS450.sensitivity.si
-    assert quantiser.register_code(math.radians(300.0), devices.ADXRS450.range.si, lsb) == 24000
-    assert quantiser.register_code(math.radians(-400.0), devices.ADXRS450.range.si, lsb) == -24000
-    assert quantiser.register_code(1.49 * lsb, 1.0, lsb) == 1
-    assert quantiser.register_code(-1.49 * lsb, 1.0, lsb) == -1
+    assert quantiser.register_code(math.radians(300.0), devices.ADXRS450.range.si, lsb, 16) == 24000
+    assert quantiser.register_code(math.radians(-400.0), devices.ADXRS450.range.si, lsb, 16) == -24000
+    assert quantiser.register_code(1.49 * lsb, 1.0, lsb, 16) == 1
+    assert quantiser.register_code(-1.49 * lsb, 1.0, lsb, 16) == -1
     g = devices.ADXL355.sensitivity.si
-    assert quantiser.register_code(9.80665, devices.ADXL355.range.si, 1 / g) == 256000
+    assert quantiser.register_code(9.80665, devices.ADXL355.range.si, 1 / g, 20) == 256000
+    assert quantiser.register_code(50.0, devices.ADXL355.range.si, 1 / g, 20) == 2**19 - 1
+    assert quantiser.register_code(-50.0, devices.ADXL355.range.si, 1 / g, 20) == -(2**19)
     assert quantiser.over_range(1.1, 1.0) == 1.0
     assert quantiser.over_range(-0.9, 1.0) == 0.0
 
@@ -130,6 +133,29 @@ def test_the_die_warms_up_by_its_own_heat_and_follows_ambient() -> None:
 def test_lever_arm_adds_tangential_and_centripetal_terms() -> None:
     force = accelerometer.at_lever_arm((0.0, 0.0, 9.8), (0.0, 0.0, 2.0), (0.0, 0.0, 5.0), (0.1, 0.0, 0.0))
     assert force == pytest.approx((-0.4, 0.5, 9.8))
+
+
+def ramp_delay_of_gyro(axis: int) -> float:
+    """Age of what the rate register shows of a rate that grows steadily, at the moment of its update."""
+    part = gyro.GyroParameters()._replace(range=0.3, resolution=1e-5, clock_error=(0.0, 0.0, 0.0))
+    part = part._replace(scale_error=ZERO3, cross_axis=(ZERO3, ZERO3, ZERO3), g_sensitivity=(ZERO3, ZERO3, ZERO3))
+    k = gyro.gyro_coefficients(part, IDENTITY3, False)
+    k = k._replace(sample_deviation=ZERO3)
+    state = gyro.initial_gyro(axis, ZERO3, ZERO3, 0.0, part, k)
+    period = k.sense_period[axis]
+    shown = 0.0
+    for tick in range(1, 401):
+        t = tick * period
+        state = gyro.sense(axis)(state, (t, t, t), ZERO3, k)
+        if tick % gyro.SENSES_PER_REGISTER == 0:
+            state = gyro.register(axis)(state, 0.0, part, k, (0.0, 0.0))
+            shown = state.code * part.resolution
+    return 400 * period - shown
+
+
+def test_the_gyro_delays_by_the_sheets_four_milliseconds() -> None:
+    # half width of the window 64/f0 = 4 ms, and 15 us of analogue bandwidth
+    assert ramp_delay_of_gyro(0) == pytest.approx(4.0e-3 + 15e-6, rel=0.02)
 
 
 def test_device_numbers_carry_source_and_confidence() -> None:
