@@ -112,7 +112,7 @@ class Parameters(NamedTuple):
     """What the user sets."""
 
     ideal: Annotated[bool, Boolean("switch every error of the parts off and read them without delay")] = False
-    seed: Annotated[int, Integer("key of all noise; equal seeds give equal noise", min=0)] = 1
+    seed: Annotated[int, Integer("key of all noise; equal seeds give equal noise", min=0, max=2**31 - 1)] = 1
     latitude: Annotated[float, Real("rad", "geographic latitude", min=-0.5 * PI, max=0.5 * PI, display="deg")] = (
         REFERENCE_LATITUDE
     )
@@ -141,7 +141,9 @@ class Coefficients(NamedTuple):
 class Inputs(NamedTuple):
     """What the world does to the sensor."""
 
-    rate: Annotated[Vector3, Real("rad/s", "true angular rate w_ib_b of the body", display="deg/s")] = ZERO3
+    rate: Annotated[Vector3, Real("rad/s", "true rate w_ib_b of the body, the Earth's included", display="deg/s")] = (
+        ZERO3
+    )
     specific_force: Annotated[Vector3, Real("m/s2", "true specific force f_b, +g upward at rest")] = (
         0.0,
         0.0,

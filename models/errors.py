@@ -7,7 +7,11 @@ class AttitudeFmuError(Exception):
     """Base of every error that this package raises on purpose."""
 
 
-class ValueRefusedError(AttitudeFmuError, ValueError):
+class InstanceError(AttitudeFmuError):
+    """An error of one instance of a model; its message begins with the instance's name."""
+
+
+class ValueRefusedError(InstanceError, ValueError):
     """A parameter or input that the model cannot take.
 
     The message reads ``instance.variable = value unit: why (allowed range)``.
@@ -20,5 +24,5 @@ class ValueRefusedError(AttitudeFmuError, ValueError):
         self.value = value
 
 
-class ModelStoppedError(AttitudeFmuError, ArithmeticError):
+class ModelStoppedError(InstanceError, ArithmeticError):
     """A model whose numbers left the range of floats; its last good state is kept."""

@@ -8,8 +8,7 @@ part from the encoders, its slow part from the gyros (`blended_rate`), whose del
 One integral per joint, in N.m, serves both loops, so that a change from one to the other is bumpless; it stops where
 the torque limit binds. The target of stabilisation is the attitude at the moment of engagement plus the setpoint.
 
-Default gains are for the default `TripodGimbal` and a gyro path of 9 ms: phase margin 41 deg or more and largest
-sensitivity 1.7 on every axis, gain margin 8 dB in yaw, where the tripod's mode lies in the loop, and 15 dB else.
+Default gains are for the default `TripodGimbal` and a gyro path of 9 ms.
 """
 
 from __future__ import annotations

@@ -93,15 +93,17 @@ def hypot(x: Scalar, y: Scalar) -> Scalar:
 
 
 def minimum(a: Scalar, b: Scalar) -> Scalar:
+    """The smaller; zeros come out positive, which of two signed zeros is smaller being up to the platform."""
     if isinstance(a, _NUMBER) and isinstance(b, _NUMBER):
-        return a if a < b else b
-    return _symbols().fmin(a, b)
+        return (a if a < b else b) + 0.0
+    return _symbols().fmin(a, b) + 0.0
 
 
 def maximum(a: Scalar, b: Scalar) -> Scalar:
+    """The larger; zeros come out positive."""
     if isinstance(a, _NUMBER) and isinstance(b, _NUMBER):
-        return a if a > b else b
-    return _symbols().fmax(a, b)
+        return (a if a > b else b) + 0.0
+    return _symbols().fmax(a, b) + 0.0
 
 
 def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:

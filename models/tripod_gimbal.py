@@ -92,7 +92,7 @@ class Parameters(NamedTuple):
         -0.03,
         0.04,
     )  # on the camera's plate, assumption
-    ambient_temperature: Annotated[float, Real("K", "of the air", 200.0, 400.0, "degC", 300.0)] = 293.15
+    ambient_temperature: Annotated[float, Real("K", "of the air", 200.0, 450.0, "degC", 300.0)] = 293.15
     latitude: Annotated[float, Real("rad", "geodetic, north positive", -PI / 2.0, PI / 2.0, "deg")] = REFERENCE_LATITUDE
     gravity: Annotated[float, Real("m/s2", "gravity where the tripod stands", 0.0, 30.0)] = STANDARD_GRAVITY
     solver_period: Annotated[float, Real("s", "step of the integration", 1e-6, 0.01, None, 1e-3)] = 1e-3
@@ -402,50 +402,76 @@ def energy(state: State, p: Parameters, c: Coefficients) -> Scalar:
     return kinetic + elastic_energy(c.mount, state.deflection) + p.gravity * lifted
 
 
-def _fastest(p: Parameters) -> float:
-    """Highest natural frequency of springs and bristles, rad/s, by the inertia that each is sure to move."""
-    springs = [k / i for k, i in zip(p.tripod.stiffness, p.tripod.inertia, strict=True)]
+def _fastest(p: Parameters, c: Coefficients) -> float:
+    """Upper bound of the fastest rate of springs, bristles and dampers, 1/s: sqrt(k/J) + C/J.
+
+    J is the inertia that each is sure to move.
+    """
     x, y, z = p.camera.inertia
-    joints = zip((p.friction.yaw, p.friction.pitch, p.friction.roll), (z, x, y), strict=True)
-    bristles = [friction.coulomb / friction.presliding / inertia for friction, inertia in joints]
-    return float(sqrt(max(springs + bristles)))
+    rates = [
+        sqrt(k / i) + damping / i
+        for k, damping, i in zip(c.mount.stiffness, c.mount.damping, p.tripod.inertia, strict=True)
+    ]
+    for friction, inertia in zip(c.friction, (z, x, y), strict=True):
+        damping = friction.damping + friction.viscous
+        rates.append(sqrt(friction.stiffness / inertia) + damping / inertia)
+    return float(max(rates))
+
+
+def _tipping(p: Parameters, c: Coefficients) -> float:
+    """Stiffness below which gravity tips the head over, N.m/rad: g sum(m (h + z))."""
+    return float(p.gravity * sum(body.mass * c.height + body.moment[2] for body in c.bodies))
+
+
+def _check_body(body: Body, name: str) -> None:
+    x, y, z = body.inertia
+    largest = max(x, y, z)
+    if largest > (x + y + z - largest) * (1.0 + 1e-9):
+        raise ValueRefusedError(
+            f"{name}.inertia", largest, "kg.m2", "larger than the other two together", "those of a rigid body"
+        )
+    xy, xz, yz = body.products
+    minors = (x * y - xy * xy, x * z - xz * xz, y * z - yz * yz)
+    if min(minors) <= 0.0 or x * minors[2] - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz) <= 0.0:
+        raise ValueRefusedError(
+            f"{name}.products", max(xy, xz, yz), "kg.m2", "too large for the moments", "those of a rigid body"
+        )
+
+
+def _check_period(name: str, period: float, length: float, why: str) -> None:
+    if 0.0 < period < length:
+        raise ValueRefusedError(name, period, "s", why, f"0 or {length} s or more")
 
 
 def rules(p: Parameters, instance: str) -> None:
-    """Inertias must be possible for a rigid body, pulses must end before they start again, the step must be stable.
+    """Bodies must be rigid, pulses must end before they start again, the tripod must stand, the step must be stable.
 
-    A step times the fastest frequency of 1 is half of what RK4 and the splitting bear.
+    A step times the fastest rate of 1 is half of what RK4 and the splitting bear.
     """
-    longest = 1.0 / _fastest(p)
+    for name in ("yaw_frame", "pitch_frame", "camera"):
+        _check_body(getattr(p, name), f"{instance}.{name}")
+    _check_period(f"{instance}.shutter.period", p.shutter.period, shutter_length(p.shutter), "the exposure is not over")
+    _check_period(f"{instance}.knock.period", p.knock.period, p.knock.width, "the blow is not over")
+    c = coefficients(p)
+    least = _tipping(p, c)
+    for axis in ("pitch", "roll"):
+        stiffness = getattr(p.tripod.stiffness, axis)
+        if stiffness <= least:
+            raise ValueRefusedError(
+                f"{instance}.tripod.stiffness.{axis}",
+                stiffness,
+                "N.m/rad",
+                "the camera's weight tips the tripod over",
+                f"more than {least} N.m/rad",
+            )
+    longest = 1.0 / _fastest(p, c)
     if p.solver_period > longest:
         raise ValueRefusedError(
             f"{instance}.solver_period",
             p.solver_period,
             "s",
-            "too long for the stiffness of tripod and friction",
+            "too long for the stiffness and damping of tripod and friction",
             f"{longest} s or less",
-        )
-    for name in ("yaw_frame", "pitch_frame", "camera"):
-        x, y, z = getattr(p, name).inertia
-        largest = max(x, y, z)
-        if largest > (x + y + z - largest) * (1.0 + 1e-9):
-            raise ValueRefusedError(
-                f"{instance}.{name}.inertia", largest, "kg.m2", "larger than the other two together", "a rigid body"
-            )
-        xy, xz, yz = getattr(p, name).products
-        minors = (x * y - xy * xy, x * z - xz * xz, y * z - yz * yz)
-        if min(minors) <= 0.0 or x * minors[2] - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz) <= 0.0:
-            raise ValueRefusedError(
-                f"{instance}.{name}.products", max(xy, xz, yz), "kg.m2", "too large for the moments", "a rigid body"
-            )
-    length = shutter_length(p.shutter)
-    if 0.0 < p.shutter.period < length:
-        raise ValueRefusedError(
-            f"{instance}.shutter.period", p.shutter.period, "s", "the exposure is not over", f"0 or {length} s or more"
-        )
-    if 0.0 < p.knock.period < p.knock.width:
-        raise ValueRefusedError(
-            f"{instance}.knock.period", p.knock.period, "s", "the blow is not over", f"0 or {p.knock.width} s or more"
         )
 
 

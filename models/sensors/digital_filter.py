@@ -36,7 +36,10 @@ def sinc2_decimated(rising: Scalar, a: Scalar, b: Scalar, n: Scalar) -> tuple[Sc
 
 
 class OverlappedWindows(NamedTuple):
-    """Partial sums of the three triangles under way when a sinc^2 of 2n is read every n samples, begun one, two and three blocks ago."""
+    """Partial sums of the three triangles under way when a sinc^2 of 2n is read every n samples.
+
+    They began one, two and three blocks ago.
+    """
 
     first: float
     second: float

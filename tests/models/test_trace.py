@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
+import math
 import random
+import sys
 from collections.abc import Callable, Iterator
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import casadi
 import pytest
 
 from attitude_fmu.fmu_src.catalogue import CATALOGUE
+from attitude_fmu.models import scalar
+from attitude_fmu.models.attitude.rotations import Euler, euler_from_matrix, matrix_from_euler
 from attitude_fmu.models.errors import ValueRefusedError
 from attitude_fmu.models.record import Boolean, Enumeration, Integer, Leaf, Real, defaults, flatten, leaves, unflatten
+from attitude_fmu.models.scalar import PI
 from attitude_fmu.models.system import Model, Run
 
 MODELS = [import_module(entry.module).MODEL for entry in CATALOGUE]
-POINTS = 40
+POINTS = 60
+COUNTERS = {
+    "ticks": (0, 1, 7, 4999, 5001, 5008, 5012, 5063, 9998, 10_003, 123_456),
+    "wind.calls": (0, 1, 500),
+    "engaged": (0, 1),
+    "attitude.alignment.samples": (0, 10, 999, 1000, 1001),
+    "attitude.fusion.rest.quiet": (0.0, 1.0, 1.6, 4.0),
+    "accelerometer.samples": (0, 4, 5, 7),
+}
+"""Values that reach every branch: start, shutter and knock, end of the alignment, rest, a due word."""
+
+NEVER_WILD = ("attitude.q_nb", "attitude.fusion.covariance")
+"""What no run can bring to zero or to a hundred times itself."""
 
 
 @pytest.fixture(autouse=True)
@@ -48,12 +66,18 @@ def near(leaf: Leaf, value: float, chance: random.Random) -> float:
         return chance.randint(1, len(fact.items))
     if isinstance(fact, Boolean):
         return chance.randint(0, 1)
+    if leaf.name in COUNTERS:
+        return chance.choice(COUNTERS[leaf.name])
     if isinstance(fact, Integer):
         return value
     assert isinstance(fact, Real)
-    moved = value * (1.0 + 0.1 * chance.gauss(0.0, 1.0)) + (0.001 * chance.gauss(0.0, 1.0) if value == 0.0 else 0.0)
     low = fact.min if fact.min is not None else -float("inf")
     high = fact.max if fact.max is not None else float("inf")
+    wild = chance.random()
+    if wild < 0.1 and not leaf.name.startswith(NEVER_WILD):
+        moved = 0.0 if wild < 0.05 else 100.0 * value
+    else:
+        moved = value * (1.0 + 0.1 * chance.gauss(0.0, 1.0)) + (0.001 * chance.gauss(0.0, 1.0) if value == 0.0 else 0.0)
     return min(max(moved, low), high)
 
 
@@ -127,6 +151,46 @@ def test_every_way_of_every_task_traces_to_the_same_bits(model: Model, task: Any
         draws = [chance.gauss(0.0, 1.0) for _ in range(task.normals)]
         values = [unflatten(record, flat) for record, flat in zip(records, (x, u, p, k), strict=True)]
         assert bits(compiled(x, u, p, k, draws)) == bits(flatten(step(*values, tuple(draws))))
+
+
+def test_the_random_points_take_every_choice_both_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without this the tests above could pass on one branch of each `where`."""
+    taken: dict[tuple[str, int], set[bool]] = {}
+    original = scalar.where
+
+    def watched(condition: Any, a: Any, b: Any) -> Any:
+        frame = sys._getframe(1)
+        taken.setdefault((Path(frame.f_code.co_filename).name, frame.f_lineno), set()).add(bool(condition))
+        return original(condition, a, b)
+
+    for name, module in list(sys.modules.items()):
+        if name.startswith("attitude_fmu.models.") and getattr(module, "where", None) is original:
+            monkeypatch.setattr(module, "where", watched)
+    for model in MODELS:
+        steps = [(task, step) for task in model.tasks for step in task.alternatives().values()]
+        chance = random.Random(4)
+        for p, k, u, x in random_cases(model, seed=3):
+            parameters, held = unflatten(model.Parameters, p), unflatten(model.Coefficients, k)
+            inputs, state = unflatten(model.Inputs, u), unflatten(model.State, x)
+            model.coefficients(parameters)
+            model.initial_state(parameters, held, inputs)
+            model.outputs(state, parameters, held)
+            for task, step in steps:
+                step(state, inputs, parameters, held, tuple(chance.gauss(0.0, 1.0) for _ in range(task.normals)))
+    assert len(taken) > 40
+    one_sided = {place for place, seen in taken.items() if len(seen) < 2}
+    assert {file for file, _ in one_sided} <= {"rotations.py"}  # straight up or down: the next test
+
+
+@pytest.mark.parametrize("pitch", [0.5 * PI, -0.5 * PI, 0.3])
+def test_euler_angles_trace_to_the_same_bits_straight_up_and_down_too(pitch: float) -> None:
+    up = math.copysign(1.0, pitch)
+    straight = ((0.8, 0.0, 0.6 * up), (-0.6 * up, 0.0, 0.8), (0.0, up, 0.0))
+    matrix = straight if abs(pitch) > 1.0 else matrix_from_euler(Euler(0.2, pitch, 0.4))
+    elements = casadi.SX.sym("c", 9)
+    rows = tuple(tuple(elements[3 * i + j] for j in range(3)) for i in range(3))
+    compiled = casadi.Function("f", [elements], [casadi.vertcat(*euler_from_matrix(rows))])
+    assert bits(compiled(flatten(matrix)).full().ravel().tolist()) == bits(list(euler_from_matrix(matrix)))
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)

@@ -316,6 +316,17 @@ def test_gusts_go_on_when_the_solver_is_refined() -> None:
         (DEFAULT._replace(knock=DEFAULT.knock._replace(period=1e-3)), "knock.period"),
         (DEFAULT._replace(solver_period=9e-3), "solver_period"),
         (DEFAULT._replace(ambient_temperature=20.0), "ambient_temperature"),
+        (DEFAULT._replace(tripod=DEFAULT.tripod._replace(stiffness=Axes(320.0, 1.0, 500.0))), "tripod.stiffness.pitch"),
+        (
+            DEFAULT._replace(
+                tripod=DEFAULT.tripod._replace(stiffness=Axes(3e4, 3e4, 3e4), damping_ratio=Axes(2.0, 2.0, 2.0))
+            ),
+            "solver_period",
+        ),
+        (
+            DEFAULT._replace(friction=DEFAULT.friction._replace(roll=DEFAULT.friction.roll._replace(viscous=10.0))),
+            "solver_period",
+        ),
     ],
 )
 def test_impossible_parameters_are_refused_by_name(changed: Parameters, name: str) -> None:
