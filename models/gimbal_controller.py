@@ -16,13 +16,12 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from .attitude.rotations import Euler
-from .plants.gimbal import Axes
+from .plants.gimbal import NO_AXES, Axes
 from .record import Boolean, Enumeration, Integer, Item, Real, Vector3, choose
 from .scalar import PI, Scalar, absolute, both, clip, cos, either, exp, maximum, sin, where, wrap
 from .system import Clock, Model, Task
 from .vectors import ZERO3, add, subtract
 
-_NO_AXES = Axes(0.0, 0.0, 0.0)
 _LEVEL = Euler(0.0, 0.0, 0.0)
 _LEAST_COSINE = 0.1
 """Of the pitch joint: beyond 84 deg the yaw joint is no longer asked for more, where the axes align."""
@@ -103,9 +102,9 @@ class Inputs(NamedTuple):
     euler: Euler = _LEVEL
     rate: Annotated[Vector3, Real("rad/s", "measured w_ib_b", display="deg/s")] = ZERO3
     attitude_valid: Annotated[bool, Boolean("the attitude is worth holding")] = False
-    joint: Annotated[Axes, Real("rad", "joint angle", display="deg")] = _NO_AXES
-    joint_rate: Annotated[Axes, Real("rad/s", "joint rate", display="deg/s")] = _NO_AXES
-    setpoint: Annotated[Axes, Real("rad", "added to the attitude or joint angle held", display="deg")] = _NO_AXES
+    joint: Annotated[Axes, Real("rad", "joint angle", display="deg")] = NO_AXES
+    joint_rate: Annotated[Axes, Real("rad/s", "joint rate", display="deg/s")] = NO_AXES
+    setpoint: Annotated[Axes, Real("rad", "added to the attitude or joint angle held", display="deg")] = NO_AXES
 
 
 class State(NamedTuple):
@@ -114,10 +113,10 @@ class State(NamedTuple):
     ticks: Annotated[float, Real("1", "controller steps so far")] = 0.0
     engaged: Annotated[float, Integer("1 while the attitude is held", 0, 1)] = 0.0
     held_attitude: Euler = _LEVEL
-    held_joint: Annotated[Axes, Real("rad", "joint angle", display="deg")] = _NO_AXES
+    held_joint: Annotated[Axes, Real("rad", "joint angle", display="deg")] = NO_AXES
     base_rate: Annotated[Vector3, Real("rad/s", "tripod's rate in camera axes, low-pass", display="deg/s")] = ZERO3
-    integral: Annotated[Axes, Real("N.m", "integral of each joint")] = _NO_AXES
-    torque: Annotated[Axes, Real("N.m", "motor torque")] = _NO_AXES
+    integral: Annotated[Axes, Real("N.m", "integral of each joint")] = NO_AXES
+    torque: Annotated[Axes, Real("N.m", "motor torque")] = NO_AXES
     saturated: Annotated[float, Boolean("a motor is at its limit")] = 0.0
 
 

@@ -19,13 +19,16 @@ from .attitude.rotations import (
     earth_rate_n,
     euler_from_matrix,
     matrix_from_euler,
+    matrix_from_turns,
     normalised,
     quaternion_from_euler,
     quaternion_product,
+    turns_of,
 )
 from .errors import ValueRefusedError
 from .plants.friction import Friction, LuGre, bristle_after, friction_torque, lugre
 from .plants.gimbal import (
+    NO_AXES,
     Axes,
     Body,
     BodyAboutO,
@@ -33,13 +36,11 @@ from .plants.gimbal import (
     JointMotion,
     Wrench,
     about_o,
-    camera_from_head,
     camera_rates,
     first_moment,
     inverse_dynamics,
     mass_matrix,
     to_camera,
-    turns_of,
 )
 from .plants.linear_equations import solve_symmetric
 from .plants.pulses import Knock, Shutter, knock_share, shutter_length, shutter_shares
@@ -49,8 +50,6 @@ from .record import Integer, Matrix3, Quaternion, Real, Vector3
 from .scalar import PI, Scalar, floor, maximum, round_half_up, sqrt
 from .system import Clock, Model, Task
 from .vectors import ZERO3, add, cross, matrix_product, multiply_transposed, scale, subtract
-
-_NO_AXES = Axes(0.0, 0.0, 0.0)
 
 # The bodies are sized after a mirrorless camera of 0.7 kg with a lens of 0.5 kg in a small gimbal: uniform boxes and
 # rings, with centres of gravity as far out as a careful user balances them (0.3 to 0.5 mm). All engineering judgement.
@@ -71,8 +70,8 @@ class Initial(NamedTuple):
     """Where the run starts: at rest, the tripod sunk into its equilibrium."""
 
     heading: Annotated[float, Real("rad", "of the tripod, clockwise from north", -10.0, 10.0, "deg")] = 0.0
-    joint: Annotated[Axes, Real("rad", "joint angle", -4.0, 4.0, "deg")] = _NO_AXES
-    joint_rate: Annotated[Axes, Real("rad/s", "joint rate", -20.0, 20.0, "deg/s")] = _NO_AXES
+    joint: Annotated[Axes, Real("rad", "joint angle", -4.0, 4.0, "deg")] = NO_AXES
+    joint_rate: Annotated[Axes, Real("rad/s", "joint rate", -20.0, 20.0, "deg/s")] = NO_AXES
 
 
 class Parameters(NamedTuple):
@@ -113,9 +112,7 @@ class Coefficients(NamedTuple):
 class Inputs(NamedTuple):
     """What the drives do."""
 
-    motor_torque: Annotated[Axes, Real("N.m", "on the joint; + turns its angle up", -100.0, 100.0, None, 0.1)] = (
-        _NO_AXES
-    )
+    motor_torque: Annotated[Axes, Real("N.m", "on the joint; + turns its angle up", -100.0, 100.0, None, 0.1)] = NO_AXES
 
 
 class State(NamedTuple):
@@ -200,7 +197,7 @@ def _motion_rate(motion: Motion, drives: Drives, c: Coefficients, gravity: Scala
     wind = to_camera(turns, drives.wind_force)
     outside = Wrench(wind, add(cross(center, wind), drives.on_camera))
     wanted, (force, moment) = inverse_dynamics(
-        bodies, turns, HeadMotion(w, ZERO3, felt), JointMotion(rates, _NO_AXES), outside
+        bodies, turns, HeadMotion(w, ZERO3, felt), JointMotion(rates, NO_AXES), outside
     )
     motor, bristle, friction, on_head = drives.motor, drives.bristle, c.friction, drives.on_head
     torques = (
@@ -318,8 +315,8 @@ def _equilibrium(drives: Drives, p: Parameters, c: Coefficients) -> Axes:
     turns = turns_of(p.initial.joint)
     force_b = to_camera(turns, drives.wind_force)
     outside = Wrench(force_b, cross(p.wind.center_of_pressure, force_b))
-    still = JointMotion(_NO_AXES, _NO_AXES)
-    e = _NO_AXES
+    still = JointMotion(NO_AXES, NO_AXES)
+    e = NO_AXES
     for _ in range(4):
         _, elastic, up = mount_motion(c.mount, e, ZERO3)
         head = HeadMotion(ZERO3, ZERO3, scale(p.gravity, up))
@@ -333,7 +330,7 @@ def _equilibrium(drives: Drives, p: Parameters, c: Coefficients) -> Axes:
 def initial_state(p: Parameters, c: Coefficients, inputs: Inputs) -> State:
     """The tripod at rest under gravity and mean wind, the joints where the parameters put them."""
     wind = WindState()
-    drives = Drives(inputs.motor_torque, _NO_AXES, ZERO3, ZERO3, _wind_force(wind, _NO_AXES, p, c, 0.0))
+    drives = Drives(inputs.motor_torque, NO_AXES, ZERO3, ZERO3, _wind_force(wind, NO_AXES, p, c, 0.0))
     deflection = _equilibrium(drives, p, c)
     start = (*deflection, *p.initial.joint, *ZERO3, *p.initial.joint_rate)
     rate = _motion_rate(start, drives, c, p.gravity, p.wind.center_of_pressure)
@@ -345,7 +342,7 @@ def initial_state(p: Parameters, c: Coefficients, inputs: Inputs) -> State:
         joint_rate=p.initial.joint_rate,
         head_acceleration=rate[6:9],
         joint_acceleration=Axes(*rate[9:12]),
-        bristle=_NO_AXES,
+        bristle=NO_AXES,
         curtains=0.0,
         mirror=0.0,
         knocks=0.0,
@@ -357,7 +354,7 @@ def outputs(state: State, p: Parameters, c: Coefficients) -> Outputs:
     """f_b = C_tb' (a_O + g up) + w' x r + w x (w x r);  w_ib_b = w_nb_b + C_nb' w_ie_n."""
     turns = turns_of(state.joint)
     c_nt = _head_attitude(state.deflection, p)
-    c_nb = matrix_product(c_nt, camera_from_head(turns))
+    c_nb = matrix_product(c_nt, matrix_from_turns(turns))
     joints = JointMotion(state.joint_rate, state.joint_acceleration)
     w, alpha = camera_rates(turns, state.head_rate, state.head_acceleration, joints)
     earth = multiply_transposed(c_nb, earth_rate_n(p.latitude))

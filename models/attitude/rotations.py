@@ -61,16 +61,29 @@ def matrix_from_quaternion(q_nb: Quaternion) -> Matrix3:
     )
 
 
-def matrix_from_euler(euler: Euler) -> Matrix3:
-    """C_nb of yaw, pitch and roll."""
-    sp, cp = sin(euler.yaw), cos(euler.yaw)
-    st, ct = sin(euler.pitch), cos(euler.pitch)
-    sg, cg = sin(euler.roll), cos(euler.roll)
+Turns = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
+"""Sine and cosine of yaw, of pitch and of roll."""
+
+
+def turns_of(angles: tuple[Scalar, Scalar, Scalar]) -> Turns:
+    """Sines and cosines of yaw, pitch and roll."""
+    yaw, pitch, roll = angles
+    return sin(yaw), cos(yaw), sin(pitch), cos(pitch), sin(roll), cos(roll)
+
+
+def matrix_from_turns(turns: Turns) -> Matrix3:
+    """Rz(-psi) Rx(theta) Ry(gamma) of sines and cosines."""
+    sp, cp, st, ct, sg, cg = turns
     return (
         (cg * cp + sg * sp * st, sp * ct, sg * cp - cg * sp * st),
         (-cg * sp + sg * cp * st, cp * ct, -sg * sp - cg * cp * st),
         (-sg * ct, st, cg * ct),
     )
+
+
+def matrix_from_euler(euler: Euler) -> Matrix3:
+    """C_nb of yaw, pitch and roll."""
+    return matrix_from_turns(turns_of(euler))
 
 
 def euler_from_matrix(c_nb: Matrix3) -> Euler:

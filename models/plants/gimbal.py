@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from ..record import Matrix3, Real, Vector3
-from ..scalar import Scalar, cos, sin
+from ..attitude.rotations import Turns
+from ..record import Real, Vector3
+from ..scalar import Scalar
 from .linear_equations import Symmetric6
 
 
@@ -21,6 +22,9 @@ class Axes(NamedTuple):
     yaw: float
     pitch: float
     roll: float
+
+
+NO_AXES = Axes(0.0, 0.0, 0.0)
 
 
 class Body(NamedTuple):
@@ -73,10 +77,6 @@ class Wrench(NamedTuple):
     torque: Vector3
 
 
-Turns = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
-"""Sine and cosine of yaw, of pitch, of roll."""
-
-
 def about_o(body: Body) -> BodyAboutO:
     """J_O = J_c + m (c'c I - c c') (Steiner)."""
     m = body.mass
@@ -88,21 +88,6 @@ def about_o(body: Body) -> BodyAboutO:
         moment=(m * x, m * y, m * z),
         inertia=(xx + m * (y * y + z * z), yy + m * (x * x + z * z), zz + m * (x * x + y * y)),
         products=(xy - m * x * y, xz - m * x * z, yz - m * y * z),
-    )
-
-
-def turns_of(joint: Axes) -> Turns:
-    yaw, pitch, roll = joint
-    return sin(yaw), cos(yaw), sin(pitch), cos(pitch), sin(roll), cos(roll)
-
-
-def camera_from_head(turns: Turns) -> Matrix3:
-    """C_tb = Rz(-yaw) Rx(pitch) Ry(roll)."""
-    sp, cp, st, ct, sg, cg = turns
-    return (
-        (cg * cp + sg * sp * st, sp * ct, sg * cp - cg * sp * st),
-        (-cg * sp + sg * cp * st, cp * ct, -sg * sp - cg * cp * st),
-        (-sg * ct, st, cg * ct),
     )
 
 

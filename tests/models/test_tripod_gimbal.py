@@ -12,10 +12,17 @@ import pytest
 from numpy.typing import NDArray
 
 from attitude_fmu.models import tripod_gimbal as plant
-from attitude_fmu.models.attitude.rotations import EARTH_RATE, Euler, matrix_from_euler, matrix_from_quaternion
+from attitude_fmu.models.attitude.rotations import (
+    EARTH_RATE,
+    Euler,
+    matrix_from_euler,
+    matrix_from_quaternion,
+    matrix_from_turns,
+    turns_of,
+)
 from attitude_fmu.models.errors import ValueRefusedError
 from attitude_fmu.models.plants.friction import Friction
-from attitude_fmu.models.plants.gimbal import Axes, Body, mass_matrix, turns_of
+from attitude_fmu.models.plants.gimbal import Axes, Body, mass_matrix
 from attitude_fmu.models.record import defaults, flatten, leaves, unflatten
 from attitude_fmu.models.system import Run
 from attitude_fmu.models.tripod_gimbal import Initial, Inputs, JointFriction, Outputs, Parameters, State
@@ -163,7 +170,7 @@ def test_the_tripod_starts_in_equilibrium() -> None:
     state = started(p)
     head = np.array(matrix_from_euler(Euler(*state.deflection)))
     o = np.array([0.0, 0.0, c.height])
-    camera = head @ plant.camera_from_head(turns_of(state.joint))
+    camera = head @ matrix_from_turns(turns_of(state.joint))
     mass = sum(body.mass for body in c.bodies)
     moment = head @ (np.array(plant.first_moment(c.bodies, turns_of(state.joint))) + mass * o)
     torque = np.cross(moment, (0.0, 0.0, -p.gravity))
