@@ -25,7 +25,7 @@ def main(
     try:
         paths = build_all(dist, names, lambda name, event: console.print(f"{name}: {event}"), always=True)
     except AttitudeFmuError as error:
-        Console(stderr=True).print(str(error), style="red", markup=False)
+        Console(stderr=True).print(str(error), style="red", markup=False, highlight=False, soft_wrap=True)
         sys.exit(1)
     for path in paths:
         console.print(f"{path}  {path.stat().st_size / 1000:.0f} kB")

@@ -70,7 +70,7 @@ class _Stepper:
         self.getters = self._calls(description, "output", "get")
         by_reference = {v.valueReference: float(v.start or 0) for v in description.modelVariables if v.type == "Real"}
         self.values = [[by_reference.get(r, values.get(kind, 0)) for r in refs] for kind, _, refs in self.setters]
-        self.time = 0.0
+        self.steps = 0
 
     def _calls(self, description: Any, causality: str, verb: str) -> list[tuple[str, Callable[..., Any], list[int]]]:
         found: dict[str, list[int]] = {}
@@ -85,10 +85,10 @@ class _Stepper:
         for _ in range(steps):
             for (_kind, call, references), values in zip(self.setters, self.values, strict=True):
                 call(references, values)
-            self.fmu.doStep(self.time, STEP)
+            self.fmu.doStep(self.steps * STEP, STEP)
             for _kind, call, references in self.getters:
                 call(references)
-            self.time += STEP
+            self.steps += 1
         return (time.perf_counter() - begin) / steps * 1e6
 
     def close(self) -> None:

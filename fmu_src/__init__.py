@@ -1,6 +1,7 @@
 """How a model becomes an FMU.
 
 At build: `catalogue` lists the models, `sources` gathers their Python files, `interface` turns their records into FMI
-variables, `description` and `documentation` write them down (`units`), `assemble` makes one FMU, `build` is the way in.
+variables, `description` and `documentation` write them down (`units`, `wording`), `assemble` makes one FMU, `build`
+is the way in.
 In the FMU: `slave` runs the model, with `ports`, `saved_state` and `failure`; they import pythonfmu and models only.
 """

@@ -33,11 +33,20 @@ def _entry(which: str | Entry) -> Entry:
     return entry_called(which) if isinstance(which, str) else which
 
 
+def _search_path() -> str:
+    """Where this process finds modules, for another one.
+
+    The current folder, where it belongs, comes last: a ``random.py`` in it must not hide the standard library's.
+    """
+    places = [place for place in sys.path if place]
+    return os.pathsep.join([*places, os.getcwd()] if "" in sys.path else places)
+
+
 def _assembled(entry: Entry, archive: Path) -> None:
-    path = os.pathsep.join(place for place in sys.path if place)
     done = subprocess.run(
-        [sys.executable, "-m", f"{__package__}.assemble", json.dumps(entry), str(archive)],
-        env={**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"},
+        # -P: with -m alone the current folder would be the first place to look
+        [sys.executable, "-P", "-m", f"{__package__}.assemble", json.dumps(entry), str(archive)],
+        env={**os.environ, "PYTHONPATH": _search_path(), "PYTHONDONTWRITEBYTECODE": "1"},
         capture_output=True,
         text=True,
         check=False,
@@ -49,17 +58,20 @@ def _assembled(entry: Entry, archive: Path) -> None:
 def build(which: str | Entry, dist: Path) -> Path:
     """Build one FMU into the folder `dist`; a file of the same name is replaced whole or not at all."""
     entry = _entry(which)
-    dist.mkdir(parents=True, exist_ok=True)
     target = dist / f"{entry.identifier}.fmu"
-    handle, unfinished = tempfile.mkstemp(prefix=f".{entry.identifier}_", suffix=".tmp", dir=dist)
-    os.close(handle)
     try:
-        _assembled(entry, Path(unfinished))
-        Path(unfinished).chmod(0o644)
-        os.replace(unfinished, target)
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(unfinished)
+        dist.mkdir(parents=True, exist_ok=True)
+        handle, unfinished = tempfile.mkstemp(prefix=f".{entry.identifier}_", suffix=".tmp", dir=dist)
+        os.close(handle)
+        try:
+            _assembled(entry, Path(unfinished))
+            Path(unfinished).chmod(0o644)
+            os.replace(unfinished, target)
+        finally:
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(unfinished)
+    except OSError as error:
+        raise BuildError(f"{target} could not be written: {error.strerror or error}") from error
     return target
 
 

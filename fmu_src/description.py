@@ -1,7 +1,8 @@
 """modelDescription.xml of a model, complete: units, types, ranges, causalities, structure.
 
 The outputs follow from the state alone, so none depends directly on an input (``dependencies=""``) and masters see
-no algebraic loop. At initialisation they depend on everything that is set (no ``dependencies``).
+no algebraic loop. At initialisation outputs and coefficients may depend on everything that is set (no
+``dependencies`` means that).
 """
 
 from __future__ import annotations
@@ -10,12 +11,13 @@ from typing import Any
 
 from lxml import etree  # type: ignore[import-untyped]
 
-from ..models.record import Boolean, Enumeration, Integer, Real
+from ..models.record import Boolean, Enumeration, Fact, Integer, Item, Real
 from ..models.system import Model
 from .catalogue import Entry
 from .errors import InterfaceError
 from .interface import Interface, Variable, interface_of
-from .units import BASE_UNITS, display_of, parse
+from .units import BASE_UNITS, Quantity, completed, display_of, parse, quantity_of
+from .wording import descriptions
 
 GENERATED = "1980-01-01T00:00:00Z"
 """Date in the description and in the archive, always the same so that the same sources give the same bytes."""
@@ -46,9 +48,10 @@ def _unit_definitions(root: Any, variables: tuple[Variable, ...]) -> None:
     displays: dict[str, set[str]] = {}
     for variable in variables:
         if isinstance(variable.fact, Real):
-            shown = displays.setdefault(variable.fact.unit, set())
-            if variable.fact.display is not None:
-                shown.add(variable.fact.display)
+            fact = completed(variable.fact)
+            shown = displays.setdefault(fact.unit, set())
+            if fact.display is not None:
+                shown.add(fact.display)
     if not displays:
         return
     definitions = etree.SubElement(root, "UnitDefinitions")
@@ -64,13 +67,40 @@ def _unit_definitions(root: Any, variables: tuple[Variable, ...]) -> None:
             etree.SubElement(element, "DisplayUnit", _attributes(name=display, factor=factor_, offset=offset or None))
 
 
+def _type_of(fact: Fact) -> tuple[str, Any] | None:
+    """Name and content of the type that a field is declared of."""
+    if isinstance(fact, Enumeration):
+        return fact.type_name, fact.items
+    quantity = quantity_of(fact) if isinstance(fact, Real) else None
+    return None if quantity is None else (quantity.name, (fact.unit, quantity))
+
+
+def _enumeration_type(simple: Any, items: tuple[Item, ...]) -> None:
+    enumeration = etree.SubElement(simple, "Enumeration")
+    for number, item in enumerate(items, 1):
+        etree.SubElement(enumeration, "Item", _attributes(name=item.name, value=number, description=item.description))
+
+
+def _real_type(simple: Any, unit: str, quantity: Quantity) -> None:
+    etree.SubElement(
+        simple,
+        "Real",
+        _attributes(
+            quantity=quantity.name,
+            unit=unit,
+            displayUnit=quantity.display,
+            relativeQuantity=quantity.relative or None,
+            nominal=quantity.nominal,
+        ),
+    )
+
+
 def _type_definitions(root: Any, variables: tuple[Variable, ...]) -> None:
-    types: dict[str, Enumeration] = {}
+    types: dict[str, Any] = {}
     for variable in variables:
-        if isinstance(variable.fact, Enumeration):
-            fact = variable.fact
-            if types.setdefault(fact.type_name, fact).items != fact.items:
-                raise InterfaceError(f"two enumerations are called {fact.type_name}")
+        declared = _type_of(variable.fact)
+        if declared is not None and types.setdefault(*declared) != declared[1]:
+            raise InterfaceError(f"two types are called {declared[0]}")
     taken = {variable.name for variable in variables} & set(types)
     if taken:
         raise InterfaceError(f"{', '.join(taken)} names a type and a variable")
@@ -79,17 +109,19 @@ def _type_definitions(root: Any, variables: tuple[Variable, ...]) -> None:
     definitions = etree.SubElement(root, "TypeDefinitions")
     for name in sorted(types):
         simple = etree.SubElement(definitions, "SimpleType", name=name)
-        enumeration = etree.SubElement(simple, "Enumeration")
-        for number, item in enumerate(types[name].items, 1):
-            etree.SubElement(
-                enumeration, "Item", _attributes(name=item.name, value=number, description=item.description)
-            )
+        if isinstance(types[name][1], Quantity):
+            _real_type(simple, *types[name])
+        else:
+            _enumeration_type(simple, types[name])
 
 
 def _type_attributes(variable: Variable) -> dict[str, str]:
-    fact, start = variable.fact, variable.start
+    fact, start, declared = variable.fact, variable.start, _type_of(variable.fact)
+    type_name = None if declared is None else declared[0]
     if isinstance(fact, Real):
+        fact = completed(fact)
         return _attributes(
+            declaredType=type_name,
             unit=fact.unit,
             displayUnit=fact.display,
             min=None if fact.min is None else float(fact.min),
@@ -102,19 +134,19 @@ def _type_attributes(variable: Variable) -> dict[str, str]:
     whole = None if start is None else int(start)
     if isinstance(fact, Integer):
         return _attributes(min=fact.min, max=fact.max, start=whole)
-    return _attributes(declaredType=fact.type_name, min=1, max=len(fact.items), start=whole)
+    return _attributes(declaredType=type_name, min=1, max=len(fact.items), start=whole)
 
 
 def _variables(root: Any, variables: tuple[Variable, ...]) -> None:
     parent = etree.SubElement(root, "ModelVariables")
-    for variable in variables:
+    for variable, description in zip(variables, descriptions(variables), strict=True):
         scalar = etree.SubElement(
             parent,
             "ScalarVariable",
             _attributes(
                 name=variable.name,
                 valueReference=variable.value_reference,
-                description=variable.fact.description,
+                description=description,
                 causality=variable.causality,
                 variability=variable.variability,
                 initial=variable.initial,
@@ -127,18 +159,14 @@ def _structure(root: Any, interface: Interface) -> None:
     structure = etree.SubElement(root, "ModelStructure")
     outputs = interface.variables[interface.outputs]
     coefficients = interface.variables[interface.coefficients]
-    parameters = " ".join(str(i + 1) for i in range(interface.parameters.start, interface.parameters.stop))
     if outputs:
         element = etree.SubElement(structure, "Outputs")
         for variable in outputs:
             etree.SubElement(element, "Unknown", index=str(variable.value_reference + 1), dependencies="")
     if outputs or coefficients:
         element = etree.SubElement(structure, "InitialUnknowns")
-        for variable in outputs:
+        for variable in (*outputs, *coefficients):
             etree.SubElement(element, "Unknown", index=str(variable.value_reference + 1))
-        for variable in coefficients:
-            index = str(variable.value_reference + 1)
-            etree.SubElement(element, "Unknown", index=index, dependencies=parameters)
 
 
 def _co_simulation(root: Any, entry: Entry) -> None:

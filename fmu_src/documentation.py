@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import html
 
-from ..models.record import Enumeration, allowed
+from ..models.record import Boolean, Enumeration, Real, allowed
 from ..models.system import Model
 from .catalogue import Entry
 from .interface import Variable, interface_of
+from .units import completed
+from .wording import descriptions
 
 EXTERNAL_DEPENDENCIES = """\
 This FMU runs Python. It carries its own sources and pythonfmu 0.7; it needs from the machine that runs it
@@ -29,10 +31,23 @@ th { background: #eef2f6; } td:first-child { font-family: ui-monospace, monospac
 """
 
 _ERRORS = """\
-A value out of its range, a fixed parameter set after initialisation, a step from a wrong communication point: the
-call returns fmi2Fatal (pythonfmu 0.7 has no other way), nothing of it is stored, and its reason is written to the log
-(with logging on) and to stderr as <code>instance.variable = value unit: why (allowed range)</code>. The instance is
-whole: it can be set rightly, reset or freed. After a failed step, reset it or restore a saved state."""
+A value out of its range, a fixed parameter set after initialisation, a call at the wrong time, a step from a wrong
+communication point: the call returns fmi2Fatal (pythonfmu 0.7 has no other way), nothing of it is stored, and its
+reason is written to the log (with logging on) and to stderr, for a value as
+<code>instance.variable = value unit: why (allowed range)</code>. The instance is whole: it can be set rightly, reset
+or freed.</p>
+<p>Values that are each in their range but do not go together can only be judged once all are set. They are stored;
+fmi2ExitInitializationMode, the next step or the next reading of a calculated value refuses them in the same way, again
+and again until they agree.</p>
+<p>When the model itself fails in a step, the instance stops: values can be read, further steps and settings are
+refused until it is reset or a saved state is restored."""
+
+_CONVENTIONS = """\
+Units are SI, temperatures in K; a unit in brackets is for showing. Body axes b are right, forward, up (elements 1, 2, 3
+of a vector); navigation axes n are east, north, up. Yaw is clockwise from north seen from above, so a positive rate
+about the up axis makes yaw fall; pitch is nose up; roll is right side down. Specific force is what an accelerometer
+feels: +g upward at rest. A body's rate is against inertial space and includes the Earth's. A quaternion is scalar
+first and turns b into n."""
 
 
 def _start(variable: Variable) -> str:
@@ -43,40 +58,70 @@ def _start(variable: Variable) -> str:
     return str(variable.start).lower() if isinstance(variable.start, bool) else f"{variable.start:.10g}"
 
 
-def _row(variable: Variable) -> str:
+def _unit(variable: Variable) -> str:
     fact = variable.fact
     unit = "" if fact.unit == "1" else fact.unit
-    display = getattr(fact, "display", None)
+    display = completed(fact).display if isinstance(fact, Real) else None
+    return unit if display is None else f"{unit} ({display})"
+
+
+def _values(variable: Variable) -> list[str]:
+    """What the variable may be, a line each."""
+    fact = variable.fact
+    if isinstance(fact, Enumeration):
+        return [f"{number} {item.name}: {item.description}" for number, item in enumerate(fact.items, 1)]
+    is_bounded = isinstance(fact, Boolean) or not fact.min is fact.max is None
+    return [allowed(fact)] if variable.start is not None or is_bounded else []
+
+
+def _row(variable: Variable, description: str) -> str:
     cells = (
-        variable.name,
-        unit if display is None else f"{unit} ({display})",
-        _start(variable),
-        allowed(fact) if variable.start is not None else "",
-        variable.variability,
-        fact.description,
+        [variable.name],
+        [_unit(variable)],
+        [_start(variable)],
+        _values(variable),
+        [variable.variability],
+        [description],
     )
-    return "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>"
+    return "<tr>" + "".join(f"<td>{'<br>'.join(map(html.escape, cell))}</td>" for cell in cells) + "</tr>"
 
 
-def _table(title: str, variables: tuple[Variable, ...]) -> str:
-    if not variables:
+def _table(described: list[tuple[Variable, str]]) -> str:
+    head = "".join(f"<th>{name}</th>" for name in ("name", "unit", "start", "values", "variability", "meaning"))
+    rows = "\n".join(_row(variable, description) for variable, description in described)
+    return f"<table>\n<tr>{head}</tr>\n{rows}\n</table>\n"
+
+
+def _by_record(described: list[tuple[Variable, str]], prefix: str) -> dict[str, list[tuple[Variable, str]]]:
+    """Variables by the record that they belong to; those of no record of their own come first, under ``""``."""
+    groups: dict[str, list[tuple[Variable, str]]] = {"": []}
+    for variable, description in described:
+        record, dot, _ = variable.name.removeprefix(prefix).partition(".")
+        groups.setdefault(record.partition("[")[0] if dot else "", []).append((variable, description))
+    return {record: group for record, group in groups.items() if group}
+
+
+def _section(title: str, described: list[tuple[Variable, str]], prefix: str | None) -> str:
+    """One heading with its table, or with a table for each record if a prefix of the names is given."""
+    if not described:
         return ""
-    head = "".join(f"<th>{name}</th>" for name in ("name", "unit", "start", "allowed", "variability", "meaning"))
-    rows = "\n".join(_row(variable) for variable in variables)
-    return f"<h2>{title}</h2>\n<table>\n<tr>{head}</tr>\n{rows}\n</table>\n"
+    groups = {"": described} if prefix is None else _by_record(described, prefix)
+    tables = ((f"<h3>{record}</h3>\n" if record else "") + _table(group) for record, group in groups.items())
+    return f"<h2>{title}</h2>\n{''.join(tables)}"
 
 
 def index_page(model: Model, entry: Entry, version: str) -> str:
-    """documentation/index.html: every variable with unit, range and meaning."""
+    """documentation/index.html: conventions, errors, and every variable with unit, range and meaning."""
     interface = interface_of(model)
-    groups = (
-        ("Inputs", interface.inputs),
-        ("Outputs", interface.outputs),
-        ("Parameters", interface.parameters),
-        ("Calculated parameters", interface.coefficients),
-        ("State", interface.state),
+    described = list(zip(interface.variables, descriptions(interface.variables), strict=True))
+    sections = (
+        ("Inputs", interface.inputs, None),
+        ("Outputs", interface.outputs, None),
+        ("Parameters", interface.parameters, ""),
+        ("Calculated parameters", interface.coefficients, "coefficient."),
+        ("State", interface.state, "state."),
     )
-    tables = "".join(_table(title, interface.variables[place]) for title, place in groups)
+    tables = "".join(_section(heading, described[place], prefix) for heading, place, prefix in sections)
     title = html.escape(model.name)
     return f"""<!DOCTYPE html>
 <html lang="en">
@@ -85,9 +130,11 @@ def index_page(model: Model, entry: Entry, version: str) -> str:
 <h1>{title}</h1>
 <p>{html.escape(model.description)}</p>
 <p>{html.escape(entry.about)}</p>
-<p>FMI 2.0 for co-simulation, attitude-fmu {html.escape(version)}. Units are SI; the unit in brackets is for showing.
-Communication steps of any length give the same results at common times for the same inputs. The Python sources lie
-in <code>resources/</code>.</p>
+<h2>Axes, signs and units</h2>
+<p>{html.escape(_CONVENTIONS)}</p>
+<h2>Use</h2>
+<p>FMI 2.0 for co-simulation, attitude-fmu {html.escape(version)}. Communication steps of any length give the same
+results at common times for the same inputs. The Python sources lie in <code>resources/</code>.</p>
 <h2>Errors</h2>
 <p>{_ERRORS}</p>
 {tables}</body>

@@ -20,7 +20,7 @@ import traceback
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ..models.errors import AttitudeFmuError
+from ..models.errors import AttitudeFmuError, InstanceError
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
@@ -41,11 +41,11 @@ def _hold(slave: Any) -> None:
 
 
 def _message(slave: Any, error: BaseException) -> str:
-    message = str(error)
-    if not isinstance(error, AttitudeFmuError):
-        message = f"{type(error).__name__}: {message}".removesuffix(": ")
-    name = str(slave.instance_name)
-    return message if message.startswith(name) else f"{name}: {message}"
+    """The error's text with the instance's name, which an `InstanceError` brings and no other does."""
+    if isinstance(error, InstanceError):
+        return str(error)
+    kind = "" if isinstance(error, AttitudeFmuError) else f"{type(error).__name__}: "
+    return f"{slave.instance_name}: {kind}{error}".removesuffix(": ")
 
 
 def _show(message: str, error: BaseException) -> None:

@@ -43,7 +43,6 @@ class Writing(NamedTuple):
     casts: list[Callable[[Any], Any]]
     variables: list[Variable]
     inputs_only: bool
-    fixed: Variable | None
 
 
 def _limits(variable: Variable) -> tuple[float, float]:
@@ -126,6 +125,5 @@ class Ports:
             [cast_of(variable) for variable in variables],
             variables,
             all(variable.causality == "input" for variable in variables),
-            next((variable for variable in variables if variable.variability == "fixed"), None),
         )
         return plans[references]

@@ -1,6 +1,6 @@
 """The saved state of an instance, as a tuple and as bytes that mean the same on every machine.
 
-Bytes, little-endian: magic, version, fingerprint of the FMU, initialised, start time, time, three counts; then the
+Bytes, little-endian: magic, version, fingerprint of the FMU, stage, start time, time, three counts; then the
 parameters and inputs, the state (both as doubles), the clocks' counters (as 64-bit integers); then a CRC-32 of it all.
 """
 
@@ -11,16 +11,19 @@ import zlib
 from typing import Any, NamedTuple
 
 _MAGIC = b"aFMU"
-_VERSION = 1
-_HEADER = struct.Struct("<4sH16s?ddIII")
+_VERSION = 2
+_HEADER = struct.Struct("<4sH16sBddIII")
 _CHECKSUM = struct.Struct("<I")
+
+INSTANTIATED, INITIALISING, STEPPING, STOPPED, TERMINATED = range(5)
+"""The stages of an instance's life, in their order."""
 
 
 class SavedState(NamedTuple):
     """Everything that decides how an instance goes on; no reference to the instance itself."""
 
     fingerprint: str
-    initialised: bool
+    stage: int
     start_time: float
     time: float
     settable: tuple[Any, ...]
@@ -40,7 +43,7 @@ def to_bytes(saved: SavedState) -> bytes:
         _MAGIC,
         _VERSION,
         bytes.fromhex(saved.fingerprint[:32]),
-        saved.initialised,
+        saved.stage,
         saved.start_time,
         saved.time,
         len(saved.settable),
@@ -59,7 +62,7 @@ def from_bytes(data: bytes) -> SavedState | DamagedState:
         return DamagedState("the bytes are no saved state of this kind of FMU")
     if _CHECKSUM.pack(zlib.crc32(body)) != data[-_CHECKSUM.size :]:
         return DamagedState("the bytes are damaged (checksum)")
-    _, version, fingerprint, initialised, start_time, time, *lengths = _HEADER.unpack_from(body)
+    _, version, fingerprint, stage, start_time, time, *lengths = _HEADER.unpack_from(body)
     if version != _VERSION:
         return DamagedState(f"the bytes are of version {version}, wanted is {_VERSION}")
     settable, state, counts = lengths
@@ -69,7 +72,7 @@ def from_bytes(data: bytes) -> SavedState | DamagedState:
     numbers = layout.unpack_from(body, _HEADER.size)
     return SavedState(
         fingerprint.hex(),
-        initialised,
+        stage,
         start_time,
         time,
         numbers[:settable],

@@ -6,6 +6,7 @@ Answers to what pythonfmu 0.7's C++ wrapper does (errors: see `failure`):
   from an exception, so they never raise: damaged bytes are refused by fmi2SetFMUstate. Nor does the constructor raise.
 * At each fmi2Instantiate it runs the slave's file a second time and drops a reference to the module's namespace;
   a class with a method of its own brings one, so every slave's file must define a method.
+* It never frees the class which that makes (2.5 kB at each fmi2Instantiate, as for any slave of pythonfmu's).
 * It leaves the resources folder in ``sys.path``; taken out here, so that a later FMU finds its own modules.
 
 Setting, stepping and getting cost little: plans for lists of value references (`ports`), outputs computed once a
@@ -16,20 +17,39 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NoReturn
 
 from pythonfmu import Fmi2Slave  # type: ignore[import-untyped]
 
-from ..models.record import Leaf, flatten, refusal, unflatten
+from ..models.errors import ValueRefusedError
+from ..models.record import Leaf, allowed, flatten, refusal, unflatten
 from ..models.system import Model, Run, Snapshot
 from .errors import CallRefusedError, InterfaceError
 from .failure import guarded
 from .interface import interface_of
 from .ports import BOOLEAN, COEFFICIENTS, EVERYTHING, INTEGER, OUTPUTS, REAL, STATE, Ports, Writing
-from .saved_state import DamagedState, SavedState, from_bytes, to_bytes
+from .saved_state import (
+    INITIALISING,
+    INSTANTIATED,
+    STEPPING,
+    STOPPED,
+    TERMINATED,
+    DamagedState,
+    SavedState,
+    from_bytes,
+    to_bytes,
+)
 
 TIME_SLACK = 1e-6
 """Part of a step by which a host's communication point may miss the end of the step before: hosts add up."""
+
+_STAGES = {
+    INSTANTIATED: "the instance is not initialised yet",
+    INITIALISING: "the instance is being initialised, which fmi2ExitInitializationMode ends",
+    STEPPING: "the instance is initialised already; fmi2Reset makes it begin anew",
+    STOPPED: "stopped by an error before; fmi2Reset or fmi2SetFMUstate makes it go on",
+    TERMINATED: "terminated; fmi2Reset or fmi2SetFMUstate makes it go on",
+}
 
 
 class ModelSlave(Fmi2Slave):  # type: ignore[misc]
@@ -50,8 +70,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         self._run: Run | None = None
         self._inputs: Any = None
         self._parameters_changed = False
-        self._initialised = False
-        self._stopped = False
+        self._stage = INSTANTIATED
         self._stale = EVERYTHING
         self._start_time = 0.0
         self._time = 0.0
@@ -64,8 +83,13 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     # the life of an instance
 
+    def _refuse_call(self, call: str) -> NoReturn:
+        raise CallRefusedError(f"{call} refused: {_STAGES[self._stage]}")
+
     @guarded
     def setup_experiment(self, start_time: float, *_stop_time_and_tolerance: float | None) -> None:
+        if self._stage != INSTANTIATED:
+            self._refuse_call("fmi2SetupExperiment")
         if not math.isfinite(start_time):
             raise CallRefusedError(f"the start time is {start_time}")
         self._start_time = self._time = start_time
@@ -73,12 +97,16 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def enter_initialization_mode(self) -> None:
-        pass
+        if self._stage != INSTANTIATED:
+            self._refuse_call("fmi2EnterInitializationMode")
+        self._stage = INITIALISING
 
     @guarded
     def exit_initialization_mode(self) -> None:
+        if self._stage != INITIALISING:
+            self._refuse_call("fmi2ExitInitializationMode")
         self._current_run()
-        self._initialised = True
+        self._stage = STEPPING
 
     @guarded
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -88,21 +116,19 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             self._inputs = unflatten(self.model.Inputs, self._values[self._ports.interface.inputs])
         until = current_time + step_size
         self._stale |= OUTPUTS | STATE
-        self._stopped = True
+        self._stage = STOPPED  # unless the step succeeds
         run.advance(self._inputs, until)
-        self._stopped = False
+        self._stage = STEPPING
         self._time = until
         return True
 
     @guarded
     def terminate(self) -> None:
-        pass
+        self._stage = TERMINATED  # at any time: hosts that clean up after an error do not ask
 
     def _check_step(self, current_time: float, step_size: float) -> None:
-        if not self._initialised:
-            raise CallRefusedError("a step before fmi2ExitInitializationMode")
-        if self._stopped:
-            raise CallRefusedError("stopped by an error before: fmi2Reset or fmi2SetFMUstate makes it go on")
+        if self._stage != STEPPING:
+            self._refuse_call("fmi2DoStep")
         if not 0.0 <= step_size < math.inf:
             raise CallRefusedError(f"a step of {step_size} s")
         if not abs(current_time - self._time) <= TIME_SLACK * step_size + 1e-9:
@@ -145,24 +171,30 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         for low, value, high in zip(plan.low, values, plan.high, strict=True):
             if not low <= value <= high:
                 self._refuse(plan, values)
-        if not plan.inputs_only:
-            self._allow_parameters(plan)
+        if self._stage > STEPPING:
+            self._refuse_call("setting values")
+        if not plan.inputs_only and self._stage == STEPPING:
+            self._allow_tuning(plan, values)
         stored = self._values
         for reference, cast, value in zip(references, plan.casts, values, strict=True):
             stored[reference] = cast(value)
         self._inputs = None
-        if not self._initialised:
+        if self._stage < STEPPING:
             self._run = None  # initial state and outputs follow from what is set
             self._stale = EVERYTHING
 
-    def _allow_parameters(self, plan: Writing) -> None:
-        if self._initialised:
-            if plan.fixed is not None:
-                raise CallRefusedError(
-                    f"{plan.fixed.name} is fixed: it can be set only before the end of initialisation"
+    def _allow_tuning(self, plan: Writing, values: list[Any]) -> None:
+        for variable, value in zip(plan.variables, values, strict=True):
+            if variable.variability == "fixed":
+                raise ValueRefusedError(
+                    f"{self.instance_name}.{variable.name}",
+                    value,
+                    variable.fact.unit,
+                    "fixed, can be set only before the end of initialisation",
+                    allowed(variable.fact),
                 )
-            self._parameters_changed = True
-            self._stale = EVERYTHING
+        self._parameters_changed = True
+        self._stale = EVERYTHING
 
     def _refuse(self, plan: Writing, values: list[Any]) -> None:
         for variable, value in zip(plan.variables, values, strict=True):
@@ -219,10 +251,10 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def _get_fmu_state(self) -> SavedState:
-        snapshot = self._current_run().snapshot() if self._initialised else Snapshot((), ())
+        snapshot = self._current_run().snapshot() if self._stage >= STEPPING else Snapshot((), ())
         return SavedState(
             self.fingerprint,
-            self._initialised,
+            self._stage,
             self._start_time,
             self._time,
             tuple(self._values[: self._ports.interface.inputs.stop]),
@@ -236,10 +268,10 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         if saved.fingerprint[:32] != self.fingerprint[:32] or len(saved.settable) != len(self._ports.starts):
             raise CallRefusedError("saved state refused: another FMU or version saved it")
         settable = [cast(value) for cast, value in zip(self._ports.casts, saved.settable, strict=True)]
-        self._run = self._restored(saved, settable) if saved.initialised else None
+        self._run = self._restored(saved, settable) if saved.stage >= STEPPING else None
         self._values[: len(settable)] = settable
-        self._inputs, self._parameters_changed, self._stopped = None, False, False
-        self._initialised, self._start_time, self._time = saved.initialised, saved.start_time, saved.time
+        self._inputs, self._parameters_changed = None, False
+        self._stage, self._start_time, self._time = saved.stage, saved.start_time, saved.time
         self._stale = EVERYTHING
 
     def _restored(self, saved: SavedState, settable: list[Any]) -> Run:

@@ -1,4 +1,4 @@
-"""Units: every unit that a record may carry, as a product of powers of the SI's base units.
+"""Units: every unit that a record may carry, as a product of powers of the SI's base units; and what they measure.
 
 A unit is written as in FMI and Modelica: ``rad/s``, ``m/s2``, ``N.m``, ``rad/(s.Hz^0.5)``. Whatever the table below
 cannot explain is refused when the FMU is built.
@@ -12,6 +12,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from ..models.errors import AttitudeFmuError
+from ..models.record import Real
 
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 """The base units of FMI 2.0, in its order."""
@@ -51,6 +52,58 @@ _SYMBOLS: dict[str, tuple[float, str]] = {
 }
 
 _OFFSETS = {"degC": -273.15}
+
+
+class Quantity(NamedTuple):
+    """What a unit measures: its name, usual magnitude, the unit to show it in; whether offsets do not apply."""
+
+    name: str
+    nominal: float
+    display: str | None = None
+    relative: bool = False
+
+
+_QUANTITIES = {
+    "rad": Quantity("Angle", 0.1, "deg"),
+    "rad/s": Quantity("AngularVelocity", 1.0, "deg/s"),
+    "rad/s2": Quantity("AngularAcceleration", 1.0, "deg/s2"),
+    "m": Quantity("Length", 0.1),
+    "m2": Quantity("Area", 0.1),
+    "m/s": Quantity("Velocity", 1.0),
+    "m/s2": Quantity("Acceleration", 10.0),
+    "s": Quantity("Time", 1.0),
+    "Hz": Quantity("Frequency", 100.0),
+    "kg": Quantity("Mass", 1.0),
+    "kg/m3": Quantity("Density", 1.0),
+    "kg.m2": Quantity("MomentOfInertia", 0.01),
+    "N.m": Quantity("Torque", 0.1),
+    "N.m.s": Quantity("AngularMomentum", 0.01),
+    "N.m/rad": Quantity("RotationalStiffness", 1e3),
+    "N.m.s/rad": Quantity("RotationalDamping", 1.0),
+    "K": Quantity("TemperatureDifference", 10.0, relative=True),
+}
+_TEMPERATURE = Quantity("Temperature", 300.0, "degC")
+"""What is in K and shown in degC; anything else in K is a difference, which no offset must touch."""
+
+
+def quantity_of(fact: Real) -> Quantity | None:
+    """The physical quantity of a field, None if its unit is not a common one."""
+    if fact.unit == "K" and fact.display == _TEMPERATURE.display:
+        return _TEMPERATURE
+    return _QUANTITIES.get(fact.unit)
+
+
+def completed(fact: Real) -> Real:
+    """The field with its quantity's display unit and magnitude where it gives none of its own."""
+    quantity = quantity_of(fact)
+    if quantity is None:
+        return fact
+    return fact._replace(
+        display=quantity.display if fact.display is None else fact.display,
+        nominal=quantity.nominal if fact.nominal is None else fact.nominal,
+    )
+
+
 _DOT = re.compile(r"\.(?=[A-Za-z%])")  # not the one inside an exponent such as ^0.5
 _FACTOR = re.compile(r"([A-Za-z%]+)(?:\^?(-?\d+(?:\.\d+)?))?")
 

@@ -24,7 +24,7 @@ class Parameters(NamedTuple):
     noise: NoiseParameters = NoiseParameters()
     mounting: Annotated[Matrix3, Real("1", "mounting matrix", min=-1.0, max=1.0)] = IDENTITY3
     shape: Annotated[int, SHAPE] = 1
-    period: Annotated[float, Real("s", "period of the fast clock", min=1e-4, max=1.0)] = 1e-3
+    period: Annotated[float, Real("s", "period of the fast clock", min=1e-4, max=1.0, nominal=1e-3)] = 1e-3
     gain: Annotated[float, Real("1", "gain", display="%", tunable=True)] = 1.0
     lower: Annotated[float, Real("1", "less than the gain", tunable=True)] = 0.0
     shift: Annotated[int, Integer("counts added to the register", min=-9, max=9, tunable=True)] = 0
@@ -36,6 +36,7 @@ class Coefficients(NamedTuple):
     fast: Annotated[float, Real("s", "fast period")]
     sigma: Annotated[float, Real("rad/s", "noise of a sample", display="deg/s")]
     whole: Annotated[int, Integer("counts")]
+    rise: Annotated[float, Real("K", "temperature of the part above ambient")]
 
 
 class Inputs(NamedTuple):
@@ -64,7 +65,7 @@ class NamedOutputs(NamedTuple):
 
 
 def coefficients(p: Parameters) -> Coefficients:
-    return Coefficients(p.period, p.noise.density * (0.5 / p.period) ** 0.5, 3)
+    return Coefficients(p.period, p.noise.density * (0.5 / p.period) ** 0.5, 3, 2.0)
 
 
 def initial_state(p: Parameters, c: Coefficients, u: Inputs) -> State:

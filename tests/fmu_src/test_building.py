@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -7,14 +8,18 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+import pythonfmu
 from fmu_instance import EVERY_KIND
 
+from attitude_fmu.fmu_src import build as building
+from attitude_fmu.fmu_src import sources
 from attitude_fmu.fmu_src.build import build, build_all, is_stale
 from attitude_fmu.fmu_src.catalogue import CATALOGUE, Entry
 from attitude_fmu.fmu_src.errors import BuildError
 from attitude_fmu.fmu_src.sources import sources_of
 
 SOURCE = Path(__file__).with_name("every_kind.py")
+COMMAND = Path(__file__).parents[2] / "build_fmu.py"
 
 
 def _names(archive: Path) -> list[str]:
@@ -47,6 +52,37 @@ def test_a_changed_source_changes_the_guid_and_the_module_names(own_model: tuple
     assert before.guid != after.guid
     assert before.package != after.package
     assert before.slave_module != after.slave_module
+
+
+@pytest.mark.parametrize("changed", ["fmu_src/description.py", "fmu_src/fmu.png", "pythonfmu/fmi2slave.py"])
+def test_what_it_is_built_with_changes_the_guid(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str
+) -> None:
+    for name, folder in (("fmu_src", sources._HERE), ("pythonfmu", Path(pythonfmu.__file__).parent)):
+        shutil.copytree(folder, tmp_path / name)
+    monkeypatch.setattr(sources, "_HERE", tmp_path / "fmu_src")
+    monkeypatch.setattr(pythonfmu, "__file__", str(tmp_path / "pythonfmu" / "__init__.py"))
+    assert not is_stale(EVERY_KIND, fmu.parent)
+    with (tmp_path / changed).open("ab") as file:
+        file.write(b"\n")
+    assert is_stale(EVERY_KIND, fmu.parent)
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_files_in_the_current_folder_hide_no_module(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own: bool
+) -> None:
+    folder = tmp_path / "users"
+    folder.mkdir()
+    for name in ("random", "xml", "logging", "lxml", "zipfile"):
+        (folder / f"{name}.py").write_text("raise SystemExit('the wrong module')")
+    shutil.copy(SOURCE, folder / "users_model.py")
+    monkeypatch.chdir(folder)
+    if own:  # an interactive session, whose own folder counts
+        monkeypatch.setattr(building.sys, "path", ["", *sys.path])
+        assert build(Entry("UsersModel", "users_model"), tmp_path).is_file()
+    else:
+        assert build(EVERY_KIND, tmp_path).read_bytes() == fmu.read_bytes()
 
 
 def test_another_models_source_does_not_change_it() -> None:
@@ -89,6 +125,37 @@ def test_the_reference_page_names_every_variable(fmu: Path) -> None:
         assert f"<td>{name}</td>" in page
 
 
+def test_the_reference_page_tells_axes_signs_and_choices(fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        page = " ".join(archive.read("documentation/index.html").decode().split())
+    assert "Body axes b are right, forward, up" in page
+    assert "a positive rate about the up axis makes yaw fall" in page
+    assert "<td>shown.level</td><td></td><td></td><td>1 low: low<br>2 high: high</td>" in page
+    assert "<td>1 lag: first-order lag<br>2 mean: mean with the last value</td>" in page
+    assert "<td>true rate (forward)</td>" in page
+    assert "<td>state.filtered[1]</td><td>rad/s (deg/s)</td>" in page
+
+
+def test_the_reference_page_is_in_groups(fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        page = archive.read("documentation/index.html").decode()
+    places = [
+        page.index(text)
+        for text in (
+            "<h2>Axes",
+            "<h2>Inputs",
+            "<h2>Outputs",
+            "<h2>Parameters",
+            "<td>gain</td>",
+            "<h3>noise</h3>",
+            "<td>noise.seed</td>",
+            "<h2>Calculated parameters",
+            "<h2>State",
+        )
+    ]
+    assert places == sorted(places)
+
+
 def test_sources_in_the_fmu_import_nothing_of_the_installed_package(fmu: Path) -> None:
     with zipfile.ZipFile(fmu) as archive:
         for name in archive.namelist():
@@ -115,14 +182,33 @@ def test_a_model_that_does_not_build_leaves_the_old_fmu(own_model: tuple[Entry, 
     assert len(list(dist.iterdir())) == 1
 
 
+@pytest.mark.parametrize("blocked", ["dist", "dist/EveryKind.fmu/x"])
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path, blocked: str) -> None:
+    place = tmp_path / blocked
+    place.parent.mkdir(parents=True, exist_ok=True)
+    place.write_text("in the way")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(BuildError, match=r"dist.EveryKind\.fmu could not be written: \w+"):
+        build(EVERY_KIND, tmp_path / "dist")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_the_command_names_a_place_that_it_cannot_write(tmp_path: Path) -> None:
+    (tmp_path / "dist").write_text("in the way")
+    command = [sys.executable, str(COMMAND), "AttitudeSensor", "--dist", str(tmp_path / "dist")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "AttitudeSensor.fmu could not be written" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_an_unknown_name_is_refused_with_the_known_ones(tmp_path: Path) -> None:
     with pytest.raises(BuildError, match="AttitudeSensor"):
         build_all(tmp_path, ["Attitude"])
 
 
 def test_the_command_names_what_it_could_not_build() -> None:
-    command = Path(__file__).parents[2] / "build_fmu.py"
-    done = subprocess.run([sys.executable, str(command), "Nothing"], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, str(COMMAND), "Nothing"], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith("there is no FMU called Nothing; there are AttitudeSensor")
 

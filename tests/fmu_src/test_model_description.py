@@ -58,6 +58,34 @@ def test_every_variable_says_what_it_is(archive: Path) -> None:
         assert variable.get("initial") or variable.get("causality") == "input"
 
 
+def test_no_two_variables_say_the_same(archive: Path) -> None:
+    said = [(v.get("causality"), v.get("description")) for v in _xml(archive).find("ModelVariables")]
+    assert len(said) == len(set(said))
+
+
+def test_angles_and_temperatures_are_shown_in_degrees(archive: Path) -> None:
+    wanted = {"rad": "deg", "rad/s": "deg/s", "rad/s2": "deg/s2"}
+    root = _xml(archive)
+    for real in root.iter("Real"):
+        if real.get("unit") in wanted:
+            assert real.get("displayUnit", "").startswith("deg")
+        if real.get("unit") == "K" and real.getparent().tag == "ScalarVariable":
+            difference = real.get("declaredType") == "TemperatureDifference"
+            assert real.get("displayUnit") == (None if difference else "degC")
+            assert real.get("nominal") == ("10.0" if difference else "300.0")
+
+
+def test_types_name_the_quantity_and_agree_with_their_variables(archive: Path) -> None:
+    root = _xml(archive)
+    types = {simple.get("name"): simple[0] for simple in root.find("TypeDefinitions")}
+    for variable in root.find("ModelVariables"):
+        name = variable[0].get("declaredType")
+        if variable[0].get("unit") in ("rad", "rad/s", "m/s2", "K", "s", "N.m", "Hz"):
+            assert types[name].get("quantity") == name
+            assert types[name].get("unit") == variable[0].get("unit")
+            assert float(variable[0].get("nominal")) > 0.0
+
+
 def test_outputs_depend_on_no_input_directly(archive: Path) -> None:
     root = _xml(archive)
     assert all(unknown.get("dependencies") == "" for unknown in root.find("ModelStructure/Outputs"))
@@ -98,4 +126,52 @@ def test_units_and_types_stand_in_the_description(fmu: Path) -> None:
         "mean",
     ]
     temperature = root.find("ModelVariables/ScalarVariable[@name='temperature']/Real").attrib
-    assert (temperature["min"], temperature["max"], temperature["displayUnit"]) == ("200.0", "400.0", "degC")
+    assert dict(temperature) == {
+        "declaredType": "Temperature",
+        "unit": "K",
+        "displayUnit": "degC",
+        "min": "200.0",
+        "max": "400.0",
+        "nominal": "300.0",
+        "start": "298.15",
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "attributes"),
+    [
+        ("period", {"nominal": "0.001", "declaredType": "Time"}),
+        ("state.filtered[1]", {"nominal": "1.0", "displayUnit": "deg/s", "declaredType": "AngularVelocity"}),
+        ("coefficient.rise", {"nominal": "10.0", "displayUnit": None, "declaredType": "TemperatureDifference"}),
+        ("gain", {"nominal": None, "displayUnit": "%", "declaredType": None}),
+        ("shift", {"min": "-9", "max": "9", "start": "0"}),
+        ("steps", {"min": "0", "max": "10"}),
+        ("noise.seed", {"min": "0", "max": None}),
+        ("shape", {"min": "1", "max": "2", "declaredType": "Shape"}),
+    ],
+)
+def test_a_field_keeps_its_facts(fmu: Path, name: str, attributes: dict[str, str | None]) -> None:
+    found = _xml(fmu).find(f"ModelVariables/ScalarVariable[@name='{name}']")[0]
+    assert {key: found.get(key) for key in attributes} == attributes
+
+
+def test_a_difference_of_temperatures_has_no_offset(fmu: Path) -> None:
+    types = _xml(fmu).find("TypeDefinitions")
+    assert types.find("SimpleType[@name='TemperatureDifference']/Real").get("relativeQuantity") == "true"
+    assert types.find("SimpleType[@name='Temperature']/Real").get("relativeQuantity") is None
+
+
+def test_coefficients_may_depend_on_everything_that_is_set(fmu: Path) -> None:
+    assert [u for u in _xml(fmu).find("ModelStructure/InitialUnknowns") if u.get("dependencies") is not None] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "description"),
+    [
+        ("noise.density", "white noise, one-sided"),
+        ("rate[3]", "true rate (up)"),
+        ("mounting[1,3]", "mounting matrix (row 1, column 3)"),
+    ],
+)
+def test_elements_tell_their_place(fmu: Path, name: str, description: str) -> None:
+    assert _xml(fmu).find(f"ModelVariables/ScalarVariable[@name='{name}']").get("description") == description

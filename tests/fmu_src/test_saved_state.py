@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from attitude_fmu.fmu_src.saved_state import DamagedState, SavedState, from_bytes, to_bytes
+from attitude_fmu.fmu_src.saved_state import STEPPING, TERMINATED, DamagedState, SavedState, from_bytes, to_bytes
 
 FINGERPRINT = "0123456789abcdef" * 2
-SAVED = SavedState(FINGERPRINT, True, 0.5, 1.25, (1.0, 298.15, 3.0), (-0.0, 5e-324), (7, 2**40))
+SAVED = SavedState(FINGERPRINT, STEPPING, 0.5, 1.25, (1.0, 298.15, 3.0), (-0.0, 5e-324), (7, 2**40))
 
 doubles = st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=9)
 
@@ -19,9 +19,9 @@ def _bits(saved: SavedState) -> bytes:
     return struct.pack(f"<{len(saved.settable) + len(saved.state)}d", *saved.settable, *saved.state)
 
 
-@given(doubles, doubles, st.lists(st.integers(0, 2**60), max_size=4), st.booleans())
-def test_every_bit_survives(settable: list[float], state: list[float], counts: list[int], initialised: bool) -> None:
-    saved = SavedState(FINGERPRINT, initialised, 0.1, math.pi, tuple(settable), tuple(state), tuple(counts))
+@given(doubles, doubles, st.lists(st.integers(0, 2**60), max_size=4), st.integers(0, TERMINATED))
+def test_every_bit_survives(settable: list[float], state: list[float], counts: list[int], stage: int) -> None:
+    saved = SavedState(FINGERPRINT, stage, 0.1, math.pi, tuple(settable), tuple(state), tuple(counts))
     back = from_bytes(to_bytes(saved))
     assert isinstance(back, SavedState)
     assert _bits(back) == _bits(saved)

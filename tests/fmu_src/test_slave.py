@@ -112,7 +112,11 @@ REFUSED: dict[str, tuple[Callable[[Instance], Any], str]] = {
     "infinite": (lambda u: u.__setitem__("gain", math.inf), r"EveryKind.gain = inf"),
     "no such choice": (lambda u: u.__setitem__("choice", 3), r"EveryKind.choice = 3: no such choice .*1 a, 2 b"),
     "integer out of range": (lambda u: u.__setitem__("steps", -1), r"EveryKind.steps = -1: too small"),
-    "fixed parameter": (lambda u: u.__setitem__("period", 2e-3), r"period is fixed"),
+    "fixed parameter": (
+        lambda u: u.__setitem__("period", 2e-3),
+        r"EveryKind.period = 0.002 s: fixed, can be set only before the end of initialisation "
+        r"\(allowed: 0.0001 to 1.0 s\)",
+    ),
     "output": (lambda u: u.__setitem__("shown.count", 3), r"shown.count cannot be set: its causality is output"),
     "wrong type": (lambda u: u.fmu.setReal([u.variables["steps"].valueReference], [1.0]), r"steps is of type Integer"),
     "reading the wrong type": (lambda u: u.fmu.getBoolean([0]), r"noise.density is of type Real, not Boolean"),
@@ -120,6 +124,18 @@ REFUSED: dict[str, tuple[Callable[[Instance], Any], str]] = {
     "no such variable": (lambda u: u.fmu.getReal([4711]), r"no variable with value reference 4711"),
     "communication point": (lambda u: u.fmu.doStep(0.5, 1e-3), r"from t = 0.5 s, but the FMU stands at t = 0.003 s"),
     "backwards": (lambda u: u.fmu.doStep(3e-3, -1e-3), r"a step of -0.001 s"),
+    "a second experiment": (
+        lambda u: u.fmu.setupExperiment(startTime=1.0),
+        r"fmi2SetupExperiment refused: the instance is initialised already",
+    ),
+    "initialising again": (
+        lambda u: u.fmu.enterInitializationMode(),
+        r"fmi2EnterInitializationMode refused: the instance is initialised already",
+    ),
+    "ending no initialisation": (
+        lambda u: u.fmu.exitInitializationMode(),
+        r"fmi2ExitInitializationMode refused: the instance is initialised already",
+    ),
 }
 
 
@@ -175,9 +191,10 @@ def test_after_a_failed_step_only_reset_or_restore_help(unit: Instance, capfd: p
     _break(unit, 3e-3)
     assert "100 % broken %s %d" in capfd.readouterr().err
     assert unit["shown.count"] == 3
-    unit["steps"] = 0
-    with pytest.raises(FMICallException):
-        unit.step(start=3e-3)
+    for call in (lambda: unit.__setitem__("steps", 0), lambda: unit.step(start=3e-3)):
+        with pytest.raises(FMICallException):
+            call()
+        assert "refused: stopped by an error before" in capfd.readouterr().err
     unit.fmu.setFMUstate(saved)
     unit.step(start=3e-3)
     assert unit["shown.count"] == 4
@@ -195,10 +212,68 @@ def test_reset_after_an_error_is_like_new(fmu: Path, load: Load) -> None:
     assert used.outputs() == fresh.outputs()
 
 
-def test_a_step_before_initialisation_is_refused(unit: Instance) -> None:
+def test_a_step_before_initialisation_is_refused(unit: Instance, capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(FMICallException):
         unit.step()
+    assert "EveryKind: fmi2DoStep refused: the instance is not initialised yet" in capfd.readouterr().err
     unit.initialise().step()
+
+
+def test_while_initialising_only_the_end_of_it_is_due(unit: Instance, capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(FMICallException):
+        unit.fmu.exitInitializationMode()
+    assert "the instance is not initialised yet" in capfd.readouterr().err
+    unit.fmu.enterInitializationMode()
+    for call in (unit.fmu.setupExperiment, unit.fmu.enterInitializationMode, unit.step):
+        with pytest.raises(FMICallException):
+            call()
+        assert "refused: the instance is being initialised" in capfd.readouterr().err
+    unit.fmu.exitInitializationMode()
+    unit.step()
+
+
+def test_after_terminate_values_are_read_and_nothing_else(unit: Instance, capfd: pytest.CaptureFixture[str]) -> None:
+    unit.initialise().step(2)
+    saved = unit.fmu.getFMUstate()
+    unit.fmu.terminate()
+    assert unit["shown.count"] == 2
+    for call in (lambda: unit.step(start=2e-3), lambda: unit.__setitem__("steps", 1), unit.initialise):
+        with pytest.raises(FMICallException):
+            call()
+        assert "refused: terminated; fmi2Reset" in capfd.readouterr().err
+    unit.fmu.terminate()
+    unit.fmu.setFMUstate(saved)
+    unit.step(start=2e-3)
+    assert unit["shown.count"] == 3
+    unit.fmu.freeFMUstate(saved)
+
+
+def test_a_saved_state_keeps_the_stage(fmu: Path, load: Load) -> None:
+    one, other = load(fmu), load(fmu)
+    one.fmu.enterInitializationMode()
+    state = one.fmu.getFMUstate()
+    copy = other.fmu.deSerializeFMUstate(one.fmu.serializeFMUstate(state))
+    other.initialise().step(5)
+    other.fmu.setFMUstate(copy)
+    with pytest.raises(FMICallException):
+        other.step()
+    other.fmu.exitInitializationMode()
+    other.step(2)
+    assert other["shown.count"] == 2
+    one.fmu.freeFMUstate(state)
+    other.fmu.freeFMUstate(copy)
+
+
+def test_parameters_out_of_step_are_refused_at_the_end_of_initialisation_until_they_agree(unit: Instance) -> None:
+    unit.fmu.enterInitializationMode()
+    unit["lower"] = 2.0
+    for call in (unit.fmu.exitInitializationMode, unit.fmu.exitInitializationMode, lambda: unit["coefficient.fast"]):
+        with pytest.raises(FMICallException):
+            call()
+    assert unit["lower"] == 2.0
+    unit["gain"] = 3.0
+    unit.fmu.exitInitializationMode()
+    unit.step()
 
 
 def test_a_restored_state_goes_on_bit_for_bit(unit: Instance) -> None:
