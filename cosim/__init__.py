@@ -5,6 +5,10 @@
 `ssp`              the same as files: ``.ssp`` archives and ``.ssv`` parameter sets
 `interface`        what an FMU offers: variables, types, units
 `master`           `simulate`: couples the FMUs and records them
+`span`             the communication points of a run
+`slave`            one FMU that takes part in a run
+`interrupts`       Ctrl-C and progress during a run
+`workspace`        folders for unpacked FMUs; files written whole or not at all
 `recording`        results on disk while a run goes on, and as FMPy writes them
 `jobs`             several runs at a time, each in a process of its own
 `scenarios`        ready-made systems by name

@@ -17,6 +17,7 @@ from .errors import SystemRefusedError
 
 Value = float | int | bool | str
 
+_INT32 = (-(2**31), 2**31 - 1)
 _TRUTHS = {"true": True, "1": True, "false": False, "0": False}
 
 
@@ -43,7 +44,8 @@ class Item(NamedTuple):
 class Variable(NamedTuple):
     """One scalar variable of an FMU, as its model description declares it.
 
-    `type` is Real, Integer, Boolean, String or Enumeration; `items` are the choices of an Enumeration.
+    `type` is Real, Integer, Boolean, String or Enumeration; `items` are the choices of an Enumeration, `minimum` and
+    `maximum` the allowed range where one is declared (the 32 bits of an Integer are its widest).
     """
 
     name: str
@@ -57,6 +59,8 @@ class Variable(NamedTuple):
     description: str
     type_name: str | None
     items: tuple[Item, ...]
+    minimum: float | None = None
+    maximum: float | None = None
 
     @property
     def settable(self) -> bool:
@@ -68,7 +72,7 @@ class Variable(NamedTuple):
     @property
     def start_value(self) -> Value | None:
         """The declared start value, None where there is none."""
-        return None if self.start is None else self.value(self.start)
+        return None if self.start is None else self._parsed(self.start.strip(), self.start)
 
     def value(self, given: Value) -> Value:
         """The value of this variable's type that `given` means: a number, true or false, or the name of a choice.
@@ -77,9 +81,29 @@ class Variable(NamedTuple):
         """
         text = str(given).strip()
         try:
-            return self._parsed(text, given)
+            value = self._parsed(text, given)
         except (ValueError, KeyError):
             raise SystemRefusedError(f"{self.name} = {text}: not {self._wanted()}") from None
+        if self.type in ("Real", "Integer"):
+            self._check_range(float(value))
+        return value
+
+    def _check_range(self, value: float) -> None:
+        below = self.minimum is not None and value < self.minimum
+        if below or (self.maximum is not None and value > self.maximum):
+            unit = f" {self.unit}" if self.unit and self.unit != "1" else ""
+            why = "small" if below else "large"
+            raise SystemRefusedError(f"{self.name} = {_digits(value)}{unit}: too {why} (allowed: {self.allowed})")
+
+    @property
+    def allowed(self) -> str:
+        """The declared range in words with its unit, nothing where none is declared."""
+        unit = f" {self.unit}" if self.unit and self.unit != "1" else ""
+        if self.minimum is not None and self.maximum is not None:
+            return f"{_digits(self.minimum)} to {_digits(self.maximum)}{unit}"
+        if self.minimum is not None:
+            return f"{_digits(self.minimum)}{unit} or more"
+        return "" if self.maximum is None else f"{_digits(self.maximum)}{unit} or less"
 
     def _parsed(self, text: str, given: Value) -> Value:
         if self.type == "Real":
@@ -116,6 +140,10 @@ class Interface(NamedTuple):
     variables: Mapping[str, Variable]
     units: Mapping[str, Unit]
     description: Any
+
+
+def _digits(value: float) -> str:
+    return str(int(value)) if value.is_integer() and abs(value) < 1e15 else f"{value:.9g}"
 
 
 def read_interface(fmu: Path) -> Interface:
@@ -158,7 +186,18 @@ def _variable(variable: Any) -> Variable:
         variable.description or "",
         None if declared is None else declared.name,
         tuple(Item(item.name, int(item.value)) for item in items),
+        *_range(variable),
     )
+
+
+def _range(variable: Any) -> tuple[float | None, float | None]:
+    places = (variable, variable.declaredType)
+    bounds = [next((b for p in places if (b := getattr(p, side, None)) is not None), None) for side in ("min", "max")]
+    if variable.type == "Integer":
+        low, high = _INT32
+        return float(low if bounds[0] is None else bounds[0]), float(high if bounds[1] is None else bounds[1])
+    least, most = (None if bound is None else float(bound) for bound in bounds)
+    return least, most
 
 
 def _unit(unit: Any) -> Unit:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .errors import ResultsError
 from .interface import Interface
 from .recording import Results
 from .report import AXES, EXPOSURE, SETTLING, Report, Roles, Signal, angle_errors, line_of_sight
+from .workspace import whole_or_not
 
 # matplotlib is imported where a picture is made: most commands need none
 if TYPE_CHECKING:
@@ -51,37 +51,40 @@ _STYLE: Any = {
 }
 
 
-def plot(
-    path: Path,
-    title: str,
-    subtitle: str,
-    results: Results,
-    roles: Roles,
-    numbers: Report,
-    interfaces: Mapping[str, Interface],
-    *,
-    attitude: Sequence[float] | None = None,
-    loop_off: Results | None = None,
-) -> Path:
-    """Draw a run into a PNG file.
+class Picture(NamedTuple):
+    """What to draw: `lines` under the title say how the system was run.
 
     `attitude` is the true attitude (rad) where no component tells it, `loop_off` the same run with the joints held.
-    `subtitle` says how the system was run. Raises `ResultsError` if the file cannot be written.
+    """
+
+    title: str
+    lines: tuple[str, ...]
+    results: Results
+    roles: Roles
+    numbers: Report
+    interfaces: Mapping[str, Interface]
+    attitude: Sequence[float] | None = None
+    loop_off: Results | None = None
+
+
+def plot(path: Path, picture: Picture) -> Path:
+    """Draw a run into a PNG file.
+
+    Raises `ResultsError` if the file cannot be written.
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
+    numbers = picture.numbers
     with mpl.rc_context(_STYLE):
-        if numbers.jitter is not None and roles.truth is not None and numbers.aligned is not None:
+        if numbers.jitter is not None and picture.roles.truth is not None and numbers.aligned is not None:
             figure = Figure(figsize=(12.0, 9.0), dpi=150)
-            _gimbal(figure, title, subtitle, results, roles, numbers, loop_off)
+            _gimbal(figure, picture)
         else:
             figure = Figure(dpi=150)
-            _variables(figure, title, subtitle, results, roles, numbers, interfaces, attitude)
-        try:
-            figure.savefig(path)
-        except OSError as error:
-            raise ResultsError(f"cannot write {path}: {error.strerror or error}") from error
+            _variables(figure, picture)
+        with whole_or_not(path) as draft:
+            figure.savefig(draft, format="png")
     return path
 
 
@@ -133,23 +136,16 @@ class _Sight:
         return np.asarray(np.fft.rfftfreq(size, 1.0 / rate)[2:]), np.sqrt(density[2:])
 
 
-def _gimbal(
-    figure: Figure,
-    title: str,
-    subtitle: str,
-    results: Results,
-    roles: Roles,
-    numbers: Report,
-    loop_off: Results | None,
-) -> None:
+def _gimbal(figure: Figure, picture: Picture) -> None:
+    _, lines, results, roles, numbers, _, _, loop_off = picture
     assert roles.truth is not None
     assert numbers.aligned is not None
     since = numbers.aligned + SETTLING
     sights = [_Sight(results, roles.truth, since, "loop on" if loop_off is not None else "line of sight", _ON)]
     if loop_off is not None:
         sights.insert(0, _Sight(loop_off, roles.truth, since, "loop off", _OFF))
-    _headings(figure, title, [subtitle, _facts(numbers)])
-    left = figure.add_gridspec(5, 1, left=0.06, right=0.635, top=0.87, bottom=0.06, hspace=0.5)
+    top = _headings(figure, picture.title, [*lines, _facts(numbers)])
+    left = figure.add_gridspec(5, 1, left=0.06, right=0.635, top=top, bottom=0.06, hspace=0.5)
     first = figure.add_subplot(left[0])
     rows = [first, *[figure.add_subplot(left[row], sharex=first) for row in range(1, 5)]]
     _sight_over_time(rows[0], "Line of sight, azimuth about the mean of each exposure", sights, "across")
@@ -161,21 +157,24 @@ def _gimbal(
         row.tick_params(labelbottom=False)
     rows[-1].set_xlabel("time (s)")
     rows[0].set_xlim(float(results["time"][0]), float(results["time"][-1]))
+    figure.align_ylabels(rows)
     for row in rows:
         row.axvspan(float(results["time"][0]), numbers.aligned, color="#EFEFEF", lw=0, zorder=0)
     right = figure.add_gridspec(
-        3, 1, left=0.7, right=0.985, top=0.87, bottom=0.06, hspace=0.36, height_ratios=(2.4, 1.5, 0.9)
+        3, 1, left=0.7, right=0.985, top=top, bottom=0.06, hspace=0.36, height_ratios=(2.4, 1.5, 0.9)
     )
     _blur(figure.add_subplot(right[0]), sights)
     _spectra(figure.add_subplot(right[1]), sights)
     _jitters(figure.add_subplot(right[2]), sights)
 
 
-def _headings(figure: Figure, title: str, lines: list[str]) -> None:
+def _headings(figure: Figure, title: str, lines: Sequence[str]) -> float:
+    """Title and lines at the top; gives where the panels may begin, as a part of the figure's height."""
     height = float(figure.get_figheight())
+    shown = [line for line in lines if line]
     figure.text(0.012, 1.0 - 0.12 / height, title, ha="left", va="top", fontsize=13, fontweight="bold")
-    text = "\n".join(line for line in lines if line)
-    figure.text(0.012, 1.0 - 0.42 / height, text, ha="left", va="top", fontsize=9.5, linespacing=1.35)
+    figure.text(0.012, 1.0 - 0.42 / height, "\n".join(shown), ha="left", va="top", fontsize=9.5, linespacing=1.35)
+    return 1.0 - (0.78 + 0.2 * len(shown)) / height
 
 
 def _facts(numbers: Report) -> str:
@@ -184,7 +183,7 @@ def _facts(numbers: Report) -> str:
     if numbers.jitter_loop_off is not None:
         parts[0] += f", {1e6 * numbers.jitter_loop_off.rms:.0f} µrad with the loop off"
     if numbers.errors:
-        worst = ", ".join(f"{error.axis} {np.degrees(error.rms):.2f}" for error in numbers.errors)
+        worst = ", ".join(f"{error.axis} {np.degrees(error.rms):.3g}" for error in numbers.errors)
         parts.append(f"sensor error rms (deg): {worst}")
     return "   ·   ".join(parts)
 
@@ -269,6 +268,7 @@ def _blur(axes: Axes, sights: list[_Sight]) -> None:
     axes.set_xlim(-1.1 * largest, 1.1 * largest)
     axes.set_ylim(-1.1 * largest, 1.1 * largest)
     axes.set_aspect("equal", adjustable="box", anchor="NW")
+    axes.locator_params(nbins=5)
     axes.set_xlabel("azimuth (µrad)", labelpad=1)
     axes.set_ylabel("elevation (µrad)", labelpad=1)
     for sight, place, side in zip(sights, (0.02, 0.98), ("left", "right"), strict=False):
@@ -299,17 +299,9 @@ def _jitters(axes: Axes, sights: list[_Sight]) -> None:
 # --- any other system ----------------------------------------------------------------------------------------------
 
 
-def _variables(
-    figure: Figure,
-    title: str,
-    subtitle: str,
-    results: Results,
-    roles: Roles,
-    numbers: Report,
-    interfaces: Mapping[str, Interface],
-    attitude: Sequence[float] | None,
-) -> None:
+def _variables(figure: Figure, picture: Picture) -> None:
     """One row for each group of variables: a vector or the angles share one."""
+    title, heading_lines, results, roles, numbers, interfaces, attitude, _ = picture
     panels = _panels(results, interfaces)
     if roles.sensor is not None and numbers.errors and numbers.aligned is not None:
         true = roles.truth or attitude
@@ -319,12 +311,10 @@ def _variables(
         panels = {"sensor error (deg)": angles, **panels}
     panels = dict(list(panels.items())[:_MOST_VARIABLES])
     rows = max(1, -(-len(panels) // 2))
-    height = 1.3 + 1.7 * rows
+    height = 1.5 + 1.7 * rows
     figure.set_size_inches(12.0, height)
-    _headings(figure, title, [subtitle])
-    grid = figure.add_gridspec(
-        rows, 2, left=0.065, right=0.985, top=1.0 - 0.95 / height, bottom=0.5 / height, hspace=0.5, wspace=0.15
-    )
+    top = _headings(figure, title, heading_lines)
+    grid = figure.add_gridspec(rows, 2, left=0.065, right=0.985, top=top, bottom=0.5 / height, hspace=0.5, wspace=0.15)
     for number, (name, lines) in enumerate(panels.items()):
         axes = figure.add_subplot(grid[number // 2, number % 2])
         axes.set_title(name)

@@ -17,6 +17,7 @@ from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 
 from .errors import ResultsError
+from .workspace import whole_or_not
 
 Results = NDArray[np.void]
 
@@ -57,17 +58,17 @@ class Recording:
             self._columns[name] = self.rows[name]
         return self._columns[name]
 
-    def results(self) -> Results:
-        """What has been recorded so far, in memory."""
-        return np.array(self.rows[: self.length])
+    def filled(self) -> Results:
+        """What has been recorded so far: a view, which must go before `close`."""
+        return self.rows[: self.length]
 
-    def close(self) -> Results:
-        """What has been recorded; the file is given back and removed."""
-        results = self.results()
+    def close(self, keep_file: bool = False) -> Results:
+        """What has been recorded, in memory; the file is removed, or nothing given and the file left to others."""
+        results: Results = np.array(self.rows[: 0 if keep_file else self.length])
         # every view must go before the file can be removed on Windows
         self._columns.clear()
         del self.rows, self.times
-        if self.path is not None:
+        if self.path is not None and not keep_file:
             with suppress(OSError):
                 self.path.unlink(missing_ok=True)
         return results
@@ -80,14 +81,44 @@ def _allocate(path: Path) -> None:
             os.posix_fallocate(file.fileno(), 0, path.stat().st_size)
 
 
-def rescue(path: Path) -> Results | None:
-    """The rows in the file that a crashed run left behind, None if there is no such file; the file is removed."""
+def read_rows(path: Path) -> Results | None:
+    """The rows in the file of a recording that was left or whose process crashed, None if there is no such file.
+
+    Raises `ResultsError` for a damaged file.
+    """
     if not path.is_file():
         return None
-    rows = np.load(path, mmap_mode="r")
-    results = np.array(rows[~np.isnan(rows["time"])])
-    del rows
-    path.unlink()
+    try:
+        # the header names every column; NumPy distrusts long ones
+        rows: Results = np.load(path, max_header_size=path.stat().st_size)
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"cannot read the rows in {path}: {error}") from error
+    # filled from the first one on
+    filled: Results = rows[: int(np.searchsorted(np.isnan(rows["time"]), True))]
+    return filled
+
+
+def keep(results: Results, path: Path, spill: Path | None) -> None:
+    """Write results to the CSV file `path`.
+
+    Raises `ResultsError` if the disk does not take it; the message names the file `spill` where the rows still are.
+    """
+    try:
+        if len(results):
+            write_csv(path, results)
+    except ResultsError as error:
+        raise ResultsError(f"{error}; the rows are kept in {spill}" if spill else str(error)) from error
+
+
+def rescue(spill: Path, path: Path) -> Results | None:
+    """Turn the file `spill` that a run left behind into the CSV file `path`; gives its rows, None if there is no file.
+
+    Raises `ResultsError` if the CSV file cannot be written; `spill` stays then.
+    """
+    results = read_rows(spill)
+    if results is not None:
+        keep(results, path, spill)
+        spill.unlink()
     return results
 
 
@@ -99,14 +130,11 @@ def write_csv(path: Path, results: Results, columns: Iterable[str] | None = None
     if columns is not None:
         results = results[["time", *columns]]
     names = results.dtype.names or ()
-    try:
-        with path.open("w", newline="\n", encoding="utf-8") as file:
-            file.write(",".join(f'"{name}"' for name in names) + "\n")
-            for start in range(0, len(results), 1000):
-                block: list[tuple[Any, ...]] = results[start : start + 1000].tolist()
-                file.writelines([",".join(map(str, row)) + "\n" for row in block])
-    except OSError as error:
-        raise ResultsError(f"cannot write {path}: {error.strerror or error}") from error
+    with whole_or_not(path) as draft, draft.open("w", newline="\n", encoding="utf-8") as file:
+        file.write(",".join(f'"{name}"' for name in names) + "\n")
+        for start in range(0, len(results), 1000):
+            block: list[tuple[Any, ...]] = results[start : start + 1000].tolist()
+            file.writelines([",".join(map(str, row)) + "\n" for row in block])
     return path
 
 

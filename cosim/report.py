@@ -21,6 +21,9 @@ EXPOSURE = 1.0
 SETTLING = 2.0
 """s from the end of the alignment until the stabilised head is taken as settled."""
 
+COARSEST = 0.010
+"""s between records, beyond which jitter would be missed."""
+
 _UNALIGNED = "The sensor did not finish its alignment: no errors to show."
 
 Signal = NDArray[np.float64]
@@ -68,7 +71,10 @@ class Spread(NamedTuple):
 
 
 class Report(NamedTuple):
-    """The numbers of one run. Times in s, angles in rad; `real_time_factor` is simulated over wall-clock time."""
+    """The numbers of one run. Times in s, angles in rad.
+
+    `real_time_factor` is simulated over wall-clock time, `no_jitter` says why there is none.
+    """
 
     duration: float
     aligned: float | None
@@ -77,6 +83,7 @@ class Report(NamedTuple):
     jitter_loop_off: Jitter | None
     spreads: tuple[Spread, ...]
     real_time_factor: float
+    no_jitter: str = ""
 
 
 def roles_of(system: System, interfaces: Mapping[str, Interface]) -> Roles:
@@ -132,7 +139,7 @@ def line_of_sight(results: Results, truth: str) -> tuple[Signal, Signal]:
 
 
 def jitter(results: Results, truth: str, since: float) -> Jitter | None:
-    """Jitter from the time `since` (s) on, None if no whole exposure fits.
+    """Jitter from the time `since` (s) on, None if no whole exposure fits or records lie too far apart.
 
     In each exposure of 1 s, the rms of sqrt(d_el^2 + (cos(el) d_az)^2) about the exposure's own mean direction.
     """
@@ -140,7 +147,7 @@ def jitter(results: Results, truth: str, since: float) -> Jitter | None:
     azimuth, elevation = line_of_sight(results, truth)
     number = np.floor((time - since + 1e-9) / EXPOSURE).astype(int)
     whole = int(np.floor((float(time[-1]) - since + 1e-9) / EXPOSURE))
-    if whole < 1:
+    if whole < 1 or _interval(results) > COARSEST:
         return None
     squares = [np.mean(_square_about_mean(azimuth, elevation, number == exposure)) for exposure in range(whole)]
     away = _square_about_mean(azimuth, elevation, (number >= 0) & (number < whole))
@@ -151,6 +158,12 @@ def jitter(results: Results, truth: str, since: float) -> Jitter | None:
         float(np.sqrt(np.mean(away))),
         float(np.sqrt(np.max(away))),
     )
+
+
+def _interval(results: Results) -> float:
+    times = results["time"]
+    # to the microsecond: times are rounded
+    return float(np.round(np.median(np.diff(times)), 6)) if len(times) > 1 else 0.0
 
 
 def _square_about_mean(azimuth: Signal, elevation: Signal, inside: NDArray[np.bool_]) -> Signal:
@@ -193,6 +206,7 @@ def report(
     truth, sensor = roles.truth, roles.sensor
     told = truth is not None and _recorded(names, truth)
     aligned = aligned_at(results, sensor) if sensor and f"{sensor}.aligned" in names else None
+    unaligned = f"{sensor}.aligned" in names and aligned is None
     errors: tuple[AngleError, ...] = ()
     true = truth if told else attitude
     if sensor and aligned is not None and true is not None and _recorded(names, sensor):
@@ -211,9 +225,17 @@ def report(
         errors,
         stabilised,
         held,
-        () if errors or stabilised else spreads(results, interfaces),
+        () if errors or stabilised or (told and unaligned) else spreads(results, interfaces),
         duration / elapsed if elapsed > 0.0 else np.inf,
+        _why_no_jitter(results) if told and steady is not None and stabilised is None else "",
     )
+
+
+def _why_no_jitter(results: Results) -> str:
+    interval = _interval(results)
+    if interval > COARSEST:
+        return f"Recorded too coarsely for jitter: every {interval:g} s; {COARSEST:g} s or less is wanted."
+    return f"No jitter: it wants {SETTLING + EXPOSURE:g} s after the alignment."
 
 
 def _recorded(names: set[str], component: str) -> bool:
@@ -269,8 +291,8 @@ def _caption(numbers: Report) -> str:
         )
         if numbers.jitter_loop_off is not None:
             lines.append("Loop off: the same run with the joints held, as on a plain head.")
-    elif numbers.aligned is not None and numbers.errors:
-        lines.append(f"No jitter: it wants {SETTLING + EXPOSURE:g} s after the alignment.")
+    elif numbers.no_jitter:
+        lines.append(numbers.no_jitter)
     return "\n".join(lines)
 
 

@@ -46,9 +46,9 @@ def gimbal(dist: Path) -> System:
     joints = [f"{group}.{axis}" for group in ("joint", "joint_rate") for axis in axes]
     euler = [f"euler.{axis}" for axis in axes]
     connections = (
-        *connect("plant", "sensor", "rate[3]", "specific_force[3]", "angular_acceleration[3]", "temperature"),
+        *connect("plant", "sensor", "rate[:3]", "specific_force[:3]", "angular_acceleration[:3]", "temperature"),
         *connect("plant", "sensor", ("euler.yaw", "heading_aid")),
-        *connect("sensor", "controller", *euler, ("rate_corrected[3]", "rate[3]"), ("aligned", "attitude_valid")),
+        *connect("sensor", "controller", *euler, ("rate_corrected[:3]", "rate[:3]"), ("aligned", "attitude_valid")),
         *connect("plant", "controller", *joints),
         *connect("controller", "plant", *[f"motor_torque.{axis}" for axis in axes]),
     )
@@ -117,6 +117,6 @@ def scenario_called(name: str) -> Scenario:
     if name not in known:
         raise SystemRefusedError(
             f"there is no scenario called {name!r}{did_you_mean(name, known)} "
-            f"(scenarios: {', '.join(known)}; or give an .ssp file)"
+            f"(scenarios: {', '.join(known)}; or give an .ssp file, to info also an .fmu file)"
         )
     return known[name]

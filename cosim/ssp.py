@@ -7,21 +7,24 @@ What is read may be laid out differently, but whatever would change the result a
 
 from __future__ import annotations
 
+import itertools
+import posixpath
 import re
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
-from typing import Any
-from urllib.parse import unquote
+from typing import Any, NamedTuple
+from urllib.parse import quote, unquote
 
 import fmpy.ssp  # type: ignore[import-untyped]
 from lxml import etree  # type: ignore[import-untyped]
 
 from .errors import ResultsError, SystemRefusedError
-from .interface import Interface, Value, Variable
+from .interface import Interface, Unit, Value, Variable
 from .system import Component, Connection, ParameterSet, Port, System, check, port_of, start_values
+from .workspace import whole_or_not
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
@@ -69,20 +72,17 @@ def write_ssp(system: System, path: Path) -> Path:
     resources = _resource_names(system)
     parameter_sets = _sets_by_component(system, interfaces)
     members = {_STRUCTURE: _structure(system, interfaces, resources, parameter_sets)}
-    for (component, name), values in parameter_sets.items():
-        members[_set_source(component, name)] = _parameter_set(name, values, interfaces[component].variables)
+    for component, (name, source, values) in parameter_sets.items():
+        members[source] = _parameter_set(name, values, interfaces[component].variables)
     for fmu, source in resources.items():
         members[source] = fmu.read_bytes()
-    try:
-        with zipfile.ZipFile(path, "w") as archive:
-            for name in (_STRUCTURE, *sorted(set(members) - {_STRUCTURE})):
-                entry = zipfile.ZipInfo(name, _ZIP_TIME)
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                entry.create_system = 3
-                entry.external_attr = 0o100644 << 16
-                archive.writestr(entry, members[name])
-    except OSError as error:
-        raise ResultsError(f"cannot write {path}: {error.strerror or error}") from error
+    with whole_or_not(path) as draft, zipfile.ZipFile(draft, "w") as archive:
+        for name in (_STRUCTURE, *sorted(set(members) - {_STRUCTURE})):
+            entry = zipfile.ZipInfo(name, _ZIP_TIME)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 3
+            entry.external_attr = 0o100644 << 16
+            archive.writestr(entry, members[name])
     return path
 
 
@@ -96,37 +96,45 @@ def write_ssv(parameters: ParameterSet, path: Path, interfaces: Mapping[str, Int
         for component, interface in interfaces.items()
         for name, variable in interface.variables.items()
     }
-    try:
-        path.write_bytes(_parameter_set(parameters.name, parameters.values, variables))
-    except OSError as error:
-        raise ResultsError(f"cannot write {path}: {error.strerror or error}") from error
+    with whole_or_not(path) as draft:
+        draft.write_bytes(_parameter_set(parameters.name, parameters.values, variables))
     return path
 
 
 def _resource_names(system: System) -> dict[Path, str]:
     names: dict[Path, str] = {}
     for component in system.components:
-        source = f"resources/{component.fmu.name}"
-        if component.fmu not in names and source in names.values():
-            source = f"resources/{component.name}_{component.fmu.name}"
-        names.setdefault(component.fmu, source)
+        if component.fmu not in names:
+            names[component.fmu] = _member(component.fmu.stem, ".fmu", names.values())
     return names
 
 
-def _sets_by_component(system: System, interfaces: Mapping[str, Interface]) -> dict[tuple[str, str], dict[str, Value]]:
-    values = start_values(system, interfaces)
-    if not values:
-        return {}
-    # one name for all, because some tools apply the sets of one name only; the last one is what the user asked for
-    name = system.parameter_sets[0].name
-    sets: dict[tuple[str, str], dict[str, Value]] = {}
-    for port, value in values.items():
-        sets.setdefault((port.component, name), {})[port.variable] = value
+def _member(stem: str, suffix: str, taken: Collection[str]) -> str:
+    """A name in the archive that is plain, because not every tool unquotes, and not taken, whatever its case."""
+    plain = re.sub(r"[^A-Za-z0-9_.-]", "_", stem)
+    others = {name.lower() for name in taken}
+    tries = (f"resources/{plain}{f'_{n}' if n > 1 else ''}{suffix}" for n in itertools.count(1))
+    return next(name for name in tries if name.lower() not in others)
+
+
+class _BoundSet(NamedTuple):
+    """The values of one component, and where they lie in the archive."""
+
+    name: str
+    source: str
+    values: dict[str, Value]
+
+
+def _sets_by_component(system: System, interfaces: Mapping[str, Interface]) -> dict[str, _BoundSet]:
+    sets: dict[str, _BoundSet] = {}
+    for port, value in start_values(system, interfaces).items():
+        if port.component not in sets:
+            # one name for all, because some tools apply the sets of one name only
+            name = system.parameter_sets[0].name
+            taken = [one.source for one in sets.values()]
+            sets[port.component] = _BoundSet(name, _member(f"{port.component}_{name}", ".ssv", taken), {})
+        sets[port.component].values[port.variable] = value
     return sets
-
-
-def _set_source(component: str, name: str) -> str:
-    return f"resources/{re.sub(r'[^A-Za-z0-9_.-]', '_', f'{component}_{name}')}.ssv"
 
 
 def _tag(name: str) -> str:
@@ -146,7 +154,7 @@ def _structure(
     system: System,
     interfaces: Mapping[str, Interface],
     resources: Mapping[Path, str],
-    parameter_sets: Mapping[tuple[str, str], Mapping[str, Value]],
+    parameter_sets: Mapping[str, _BoundSet],
 ) -> bytes:
     root = etree.Element(_tag("ssd:SystemStructureDescription"), {"version": "1.0", "name": system.name}, _PREFIXES)
     if system.description:
@@ -156,16 +164,15 @@ def _structure(
     shown: list[tuple[Variable, Interface]] = []
     for component in system.components:
         interface = interfaces[component.name]
-        sets = {name: values for (owner, name), values in parameter_sets.items() if owner == component.name}
-        source = resources[component.fmu]
+        bound = parameter_sets.get(component.name)
+        source = quote(resources[component.fmu])
         element = _add(elements, "ssd:Component", name=component.name, type=_FMU_TYPE, source=source)
-        variables = _shown(system, component, interface, {name for values in sets.values() for name in values})
+        variables = _shown(system, component, interface, set() if bound is None else set(bound.values))
         _add_connectors(element, variables)
         shown += [(variable, interface) for variable in variables]
-        if sets:
+        if bound is not None:
             bindings = _add(element, "ssd:ParameterBindings")
-            for name in sets:
-                _add(bindings, "ssd:ParameterBinding", type=_SET_TYPE, source=_set_source(component.name, name))
+            _add(bindings, "ssd:ParameterBinding", type=_SET_TYPE, source=quote(bound.source))
     if system.connections:
         connections = _add(top, "ssd:Connections")
         for source_port, target_port in system.connections:
@@ -295,6 +302,8 @@ def read_ssp(path: Path, directory: Path) -> System:
             return _Reader(path.name, archive, directory).system()
     except zipfile.BadZipFile as error:
         raise SystemRefusedError(f"{path.name} is not an SSP archive ({error})") from None
+    except OSError as error:
+        raise ResultsError(f"cannot unpack {path}: {error.strerror or error}") from error
 
 
 def read_ssv(path: Path) -> ParameterSet:
@@ -305,7 +314,7 @@ def read_ssv(path: Path) -> ParameterSet:
     if not path.is_file():
         raise SystemRefusedError(f"file not found: {path}")
     root = _parsed(path.read_bytes(), path.name, "SystemStructureParameterValues.xsd")
-    return ParameterSet(root.get("name"), _values(root, path.name))
+    return _values(root, path.name)
 
 
 def _parsed(text: bytes, where: str, schema: str) -> Any:
@@ -328,26 +337,31 @@ def _validate(root: Any, where: str, schema: str) -> None:
         raise SystemRefusedError(f"{where} does not follow the SSP 1.0 schema, line {first.line}: {text}")
 
 
-def _values(root: Any, where: str) -> dict[str, Value]:
+def _values(root: Any, where: str, prefix: str = "") -> ParameterSet:
+    known = {unit.name: unit for unit in map(_unit, root.iterfind("ssv:Units/ssc:Unit", _PREFIXES))}
     values: dict[str, Value] = {}
+    units: dict[str, Unit] = {}
     for parameter in root.iterfind("ssv:Parameters/ssv:Parameter", _PREFIXES):
-        name = parameter.get("name")
+        name = prefix + parameter.get("name")
         typed = next(parameter.iterchildren("*"))
         if _local(typed) == "Binary":
             raise SystemRefusedError(f"{where}: parameter {name} is Binary, which FMI 2.0 does not know")
-        if typed.get("unit") is not None:
-            _check_unit_is_si(root, typed.get("unit"), name, where)
         values[name] = typed.get("value")
-    return values
-
-
-def _check_unit_is_si(root: Any, unit: str, name: str, where: str) -> None:
-    for base in root.iterfind(f"ssv:Units/ssc:Unit[@name='{unit}']/ssc:BaseUnit", _PREFIXES):
-        if float(base.get("factor", 1.0)) != 1.0 or float(base.get("offset", 0.0)) != 0.0:
+        unit = typed.get("unit")
+        if unit is not None and unit not in known:
             raise SystemRefusedError(
-                f"{where}: parameter {name} is given in {unit}, which is not the SI unit; give it in the FMU's own "
-                "unit and leave the unit out"
+                f"{where}: parameter {name} is given in {unit}, which the set does not define under Units; define it, "
+                "or give the value in the FMU's own unit and leave the unit out"
             )
+        if unit is not None:
+            units[name] = known[unit]
+    return ParameterSet(root.get("name"), values, units)
+
+
+def _unit(element: Any) -> Unit:
+    base = element.find("ssc:BaseUnit", _PREFIXES)
+    exponents = tuple(int(base.get(symbol, 0)) for symbol in _BASE_UNITS)
+    return Unit(element.get("name"), exponents, float(base.get("factor", 1.0)), float(base.get("offset", 0.0)))
 
 
 def _local(element: Any) -> str:
@@ -417,8 +431,8 @@ class _Reader:
         return Component(name, self.unpack(element, element.get("source")))
 
     def member(self, element: Any, source: str) -> str:
-        path = unquote(source)
-        if ":" in path or path.startswith("/") or ".." in PurePosixPath(path).parts:
+        path = posixpath.normpath(unquote(source))
+        if ":" in path or path.startswith(("/", "..")):
             raise self.refuse(element, f"source {source} lies outside the archive; put the file into resources/")
         if path not in self.archive.namelist():
             raise self.refuse(element, f"{source} is missing in the archive")
@@ -465,8 +479,7 @@ class _Reader:
                 raise self.refuse(binding, f"parameter sets of type {binding.get('type')} are not supported")
             root = self.bound_set(binding)
             prefix = (f"{component}." if component else "") + binding.get("prefix", "")
-            values = _values(root, f"{self.where}, parameter set {root.get('name')}")
-            yield ParameterSet(root.get("name"), {prefix + name: value for name, value in values.items()})
+            yield _values(root, f"{self.where}, parameter set {root.get('name')}", prefix)
 
     def bound_set(self, binding: Any) -> Any:
         schema = "SystemStructureParameterValues.xsd"

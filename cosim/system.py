@@ -44,10 +44,11 @@ class Connection(NamedTuple):
 
 
 class ParameterSet(NamedTuple):
-    """Values under the names ``component.variable``."""
+    """Values under the names ``component.variable``; `units` are those that were given with a value."""
 
     name: str
     values: Mapping[str, Value]
+    units: Mapping[str, Unit] = {}
 
 
 @dataclass(frozen=True)
@@ -64,13 +65,17 @@ class System:
 
     def with_values(self, name: str, values: Mapping[str, Value]) -> System:
         """The same system with one more parameter set, which wins over those before it."""
-        return replace(self, parameter_sets=(*self.parameter_sets, ParameterSet(name, values))) if values else self
+        return self.with_set(ParameterSet(name, values)) if values else self
+
+    def with_set(self, parameter_set: ParameterSet) -> System:
+        """The same system with one more parameter set, which wins over those before it."""
+        return replace(self, parameter_sets=(*self.parameter_sets, parameter_set))
 
 
 def connect(source: str, target: str, *pairs: str | tuple[str, str]) -> tuple[Connection, ...]:
     """Wires from one component to another, each ``"name"`` or ``("output", "input")``.
 
-    A name that ends in ``[3]`` stands for its three elements, one that ends in ``[4]`` for four.
+    A name that ends in ``[:3]`` stands for its first three elements, ``[1]`` to ``[3]``.
     """
     wires = []
     for pair in pairs:
@@ -81,10 +86,8 @@ def connect(source: str, target: str, *pairs: str | tuple[str, str]) -> tuple[Co
 
 
 def _elements(name: str) -> list[str]:
-    if not name.endswith("]"):
-        return [name]
-    stem, _, count = name[:-1].rpartition("[")
-    return [f"{stem}[{i + 1}]" for i in range(int(count))]
+    stem, colon, count = name.removesuffix("]").rpartition("[:")
+    return [f"{stem}[{i + 1}]" for i in range(int(count))] if colon else [name]
 
 
 def port_of(name: str, components: Iterable[str]) -> Port:
@@ -141,6 +144,8 @@ def start_values(system: System, interfaces: Mapping[str, Interface]) -> dict[Po
                 )
             if port in wired:
                 raise SystemRefusedError(f"{port} cannot be set: {wired[port].source} is connected to it")
+            if name in parameter_set.units:
+                _check_given_unit(port, parameter_set.units[name], variable, interfaces)
             try:
                 values[port] = variable.value(given)
             except SystemRefusedError as error:
@@ -246,6 +251,13 @@ def _check_units(
     raise SystemRefusedError(
         f"connection {connection}: unit {source.unit} does not fit {target.unit}{_conversion(first, second)}"
     )
+
+
+def _check_given_unit(port: Port, given: Unit, variable: Variable, interfaces: Mapping[str, Interface]) -> None:
+    own = interfaces[port.component].units.get(variable.unit or "")
+    if variable.unit is None or (given.name == variable.unit if own is None else given.same_quantity(own)):
+        return
+    raise SystemRefusedError(f"{port} is given in {given.name}, not in {variable.unit}{_conversion(given, own)}")
 
 
 def _conversion(first: Unit | None, second: Unit | None) -> str:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 
 import fmpy
@@ -18,6 +19,13 @@ from attitude_fmu.cosim.interface import read_interface
 from attitude_fmu.cosim.recording import read_csv, write_csv
 from attitude_fmu.cosim.ssp import open_ssp, read_ssv, write_ssp
 from attitude_fmu.cosim.system import Component, System, check, start_values
+
+HEARING_CTRL_C = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs the tests may ignore it
+from attitude_fmu.cosim.command_line import main
+main()
+"""
 
 
 @pytest.fixture(scope="session")
@@ -50,6 +58,12 @@ def test_default_scenario_end_to_end(dist: Path, tmp_path: Path) -> None:
     assert used.values["sensor.seed"] == "7"
     assert used.values["controller.mode"] == "3"
     assert len(used.values) > 100
+    again = run("run", str(out / "system.ssp"), "--step", "0.002", "--out", str(tmp_path / "again"))
+    assert again.exit_code == 0, again.stderr
+    assert "3.5 s, communication step" in again.stdout
+    assert "jitter, loop off" in again.stdout
+    repeated = read_csv(tmp_path / "again" / "results.csv")
+    assert (repeated["sensor.euler.yaw"] == results["sensor.euler.yaw"]).all()
     with zipfile.ZipFile(out / "system.ssp") as archive:
         texts = [archive.read(name).decode() for name in archive.namelist() if not name.endswith(".fmu")]
     # other tools do not read them
@@ -92,6 +106,18 @@ def test_step_of_communication_and_order_agree_at_rest(dist: Path, tmp_path: Pat
         (("run", "static", "--set", "sensor.solver.kind=gyros"), 1, "not one of levelling (1), gyro (2), fused (3)"),
         (("run", "static", "--record", "sensor.eulr.*"), 1, "nothing to record is called sensor.eulr.*"),
         (("run", "static", "--step", "0"), 1, "step = 0 s: a positive time is wanted"),
+        (("run", "static", "--step", "1e-300"), 1, "too small for 60 s (at most 1e+09 steps)"),
+        (("run", "static", "--interval", "nan"), 1, "recording interval = nan s: a multiple of the step"),
+        (
+            ("run", "gimbal", "--set", "plant.wind.speed=-5"),
+            1,
+            "plant.wind.speed = -5 m/s: too small (allowed: 0 to 60",
+        ),
+        (("run", "static", "--set", "sensor.seed=4294967296"), 1, "sensor.seed = 4294967296: too large (allowed: 0 to"),
+        (("run", "/tmp"), 1, "/tmp is a folder; give the .ssp file of a system"),
+        (("info", "nosuch"), 1, "to info also an .fmu file"),
+        (("info", "static", "--pattern", "nosuch"), 1, "static has nothing with 'nosuch' in its name"),
+        (("build", "AttitudeSensor", "--dist", "/proc/none"), 1, "/proc/none"),
         (("run", "static", "--out", "/proc/none"), 1, "cannot write into /proc/none"),
         (("run", "--master", "newton"), 2, "newton"),
         (("build", "AtitudeSensor"), 1, "AtitudeSensor"),
@@ -102,18 +128,56 @@ def test_wrong_request_is_one_clear_line(
     dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], code: int, message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    extra = () if arguments[0] == "info" else ("--dist", str(dist))
+    extra = () if "--dist" in arguments else ("--dist", str(dist))
     done = run(*arguments, *extra)
     assert done.exit_code == code
     assert message in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr
+    ours = [line for line in done.stderr.splitlines() if not line.startswith("building ")]
+    assert len(ours) == 1 or code == 2
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("--step", "-1"),
+        ("--interval", "0.15"),
+        ("--record", "nosuch"),
+        ("--set", "motor.way=x"),
+        ("--set", "motor.way=7"),
+    ],
+)
+def test_refused_run_leaves_earlier_results_alone(
+    fmus: dict[str, Path], tmp_path: Path, wrong: tuple[str, str]
+) -> None:
+    system = System("t", (Component("motor", fmus["troublemaker"]),), stop_time=1.0)
+    path = write_ssp(system, tmp_path / "t.ssp")
+    out = tmp_path / "out"
+    assert run("run", str(path), "--step", "0.1", "--out", str(out)).exit_code == 0
+    before = {file.name: file.read_bytes() for file in out.iterdir()}
+    done = run("run", str(path), "--step", "0.1", "--out", str(out), *wrong)
+    assert done.exit_code == 1
+    assert {file.name: file.read_bytes() for file in out.iterdir()} == before
+
+
+def test_system_and_parameters_that_were_given_are_not_overwritten(fmus: dict[str, Path], tmp_path: Path) -> None:
+    path = write_ssp(System("t", (Component("motor", fmus["troublemaker"]),), stop_time=1.0), tmp_path / "t.ssp")
+    out = tmp_path / "out"
+    assert run("run", str(path), "--step", "0.1", "--stop", "0.5", "--out", str(out)).exit_code == 0
+    done = run("run", str(out / "system.ssp"), "--out", str(out))
+    assert done.exit_code == 1
+    assert "would be overwritten by what the run writes; choose another --out" in " ".join(done.stderr.split())
+    done = run("run", str(path), "--parameters", str(out / "parameters.ssv"), "--out", str(out))
+    assert "would be overwritten" in done.stderr
+    with open_ssp(out / "system.ssp") as back:
+        assert back.stop_time == 0.5
 
 
 def test_bad_value_is_refused_in_the_words_of_the_fmu(dist: Path, tmp_path: Path) -> None:
     settings = ("--set", "sensor.temperature=25")
     done = run("run", "static", "--stop", "0.1", "--out", str(tmp_path), "--dist", str(dist), *settings)
     assert done.exit_code == 1
-    assert "returned fatal at t = 0 s: sensor.temperature = 25.0 K: too small, kelvin wanted" in done.stderr
+    assert "sensor.temperature = 25 K: too small (allowed: 200 to 450 K)" in done.stderr
     assert len(done.stderr.split("attitude-fmu:")[1].strip().splitlines()) == 1
 
 
@@ -149,23 +213,34 @@ def test_own_ssp_gets_summary_table_picture_and_all_outputs(fmus: dict[str, Path
 
 
 def test_ctrl_c_says_so_and_keeps_the_results(dist: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "attitude_fmu.cosim.command_line", "run", "static", "--stop", "1000"]
+    command = [sys.executable, "-c", HEARING_CTRL_C, "run", "static", "--stop", "1000"]
     options = ["--out", str(tmp_path), "--dist", str(dist), "--interval", "0.1"]
-    with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+    with subprocess.Popen(
+        [*command, *options],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
         spill = tmp_path / "results.partial.npy"
         for _ in range(300):
             if spill.is_file():
                 break
             time.sleep(0.1)
         time.sleep(1.0)
-        # as a terminal does: to the whole group
-        os.killpg(process.pid, signal.SIGINT)
-        _, said = process.communicate(timeout=60.0)
+        try:
+            # as a terminal does: to the whole group
+            os.killpg(process.pid, signal.SIGINT)
+            _, said = process.communicate(timeout=60.0)
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 130
     assert "stopped by the user at t = " in said
     assert "Traceback" not in said
     rows = read_csv(tmp_path / "results.csv")
     assert len(rows) >= 1
+    assert f"stopped by the user at t = {rows['time'][-1]:.6g} s" in said
+    assert "stopping ..." in said
     assert not spill.exists()
 
 
@@ -179,6 +254,10 @@ def test_version_and_help(dist: Path) -> None:
     shown = run("info", "static", "--dist", str(dist), "--pattern", "solver").stdout
     assert "sensor.solver.kind" in shown
     assert "2 gyro" in shown
+    shown = run("info", "gimbal", "--dist", str(dist), "--pattern", "wind").stdout
+    assert "plant.wind.speed = 10 m/s  (0 to 60 m/s)" in shown
+    assert "mean speed at the camera" in shown
+    assert "plant.rate[1] -> sensor.rate[1]" in run("info", "gimbal", "--dist", str(dist), "--all").stdout
 
 
 def test_csv_of_a_run_is_what_fmpy_writes(dist: Path, tmp_path: Path) -> None:

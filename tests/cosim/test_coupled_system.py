@@ -4,6 +4,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from slave_building import METRE, with_units
 
 from attitude_fmu.cosim.errors import SystemRefusedError
 from attitude_fmu.cosim.interface import Item, Unit, Variable
@@ -88,24 +89,6 @@ def test_missing_and_broken_fmus_are_named(parts: tuple[Component, ...], tmp_pat
         check(System("s", ()))
 
 
-def with_units(fmu: Path, target: Path, definitions: str, unit: str) -> Path:
-    """The gain with units on its variables."""
-    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(target, "w") as new:
-        for name in old.namelist():
-            data = old.read(name)
-            if name == "modelDescription.xml":
-                text = data.decode().replace("<Real", f'<Real unit="{unit}"')
-                data = text.replace(
-                    "<LogCategories>", f"<UnitDefinitions>{definitions}</UnitDefinitions><LogCategories>"
-                )
-                data = data.encode()
-            new.writestr(name, data)
-    return target
-
-
-METRE = '<Unit name="m"><BaseUnit m="1"/></Unit>'
-
-
 @pytest.mark.parametrize(
     ("definitions", "unit", "message"),
     [
@@ -148,9 +131,10 @@ def test_component_names_may_hold_dots() -> None:
 
 
 def test_connect_spreads_vectors() -> None:
-    assert connect("a", "b", ("rate[2]", "w[2]"), "t") == (
+    assert connect("a", "b", ("rate[:2]", "w[:2]"), ("rate[3]", "z"), "t") == (
         wire("a.rate[1]", "b.w[1]"),
         wire("a.rate[2]", "b.w[2]"),
+        wire("a.rate[3]", "b.z"),
         wire("a.t", "b.t"),
     )
 
@@ -164,6 +148,25 @@ def test_enumeration_takes_names_and_numbers() -> None:
     for wrong in ("onn", "3"):
         with pytest.raises(SystemRefusedError, match=rf"mode = {wrong}: not one of off \(1\), on \(2\)"):
             mode.value(wrong)
+
+
+def test_value_out_of_the_declared_range_is_refused() -> None:
+    speed = Variable("speed", 0, "Real", "parameter", "fixed", "exact", "m/s", "1", "", None, (), 0.0, 60.0)
+    assert speed.value("60") == 60.0
+    for wrong, message in (
+        ("-5", r"speed = -5 m/s: too small \(allowed: 0 to 60 m/s\)"),
+        ("60.5", r"speed = 60\.5 m/s: too large"),
+        ("inf", "not a finite number"),
+    ):
+        with pytest.raises(SystemRefusedError, match=message):
+            speed.value(wrong)
+
+
+@pytest.mark.parametrize("number", [2**31, -(2**31) - 1])
+def test_whole_number_beyond_32_bits_is_refused(parts: tuple[Component, ...], number: int) -> None:
+    system = System("s", parts).with_values("v", {"board.number_in": number})
+    with pytest.raises(SystemRefusedError, match=r"board\.number_in = .*\(allowed: -2147483648 to 2147483647\)"):
+        check(system)
 
 
 def test_units_of_one_quantity_are_equal() -> None:

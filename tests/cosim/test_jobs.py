@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import threading
@@ -12,6 +13,7 @@ from attitude_fmu.cosim.errors import RunStoppedError, SystemRefusedError
 from attitude_fmu.cosim.jobs import Job, run_jobs
 from attitude_fmu.cosim.master import simulate
 from attitude_fmu.cosim.system import Component, System
+from attitude_fmu.models.errors import AttitudeFmuError
 
 
 def trouble(fmus: dict[str, Path], way: int) -> System:
@@ -55,6 +57,77 @@ def test_refusal_crosses_the_process(fmus: dict[str, Path], tmp_path: Path) -> N
     system = trouble(fmus, 0).with_values("typo", {"motor.wya": 1})
     with pytest.raises(SystemRefusedError, match="did you mean way"):
         run_jobs([Job("refused", system, tmp_path / "r.csv", 1.0)], silent)
+
+
+def test_error_of_our_own_is_called_one(decay: System, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    job = Job("odd", decay, tmp_path / "r.csv", 1.0, record=(5,))  # type: ignore[arg-type]
+    with pytest.raises(AttitudeFmuError, match="internal error: TypeError"):
+        run_jobs([job], silent)
+    assert "Traceback" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(("presses", "patience"), [(1, 10.0), (2, 1.9)])
+def test_fmu_that_hangs_is_ended_and_its_rows_are_kept(
+    fmus: dict[str, Path], tmp_path: Path, presses: int, patience: float
+) -> None:
+    reached = threading.Event()
+    told: list[str] = []
+    pressed: list[float] = []
+
+    def press() -> None:
+        reached.wait(30.0)
+        time.sleep(0.3)
+        pressed.append(time.monotonic())
+        for _ in range(presses):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.3)
+
+    def watch(_name: str, time: float) -> None:
+        if time > 0.45:
+            reached.set()
+
+    thread = threading.Thread(target=press)
+    thread.start()
+    job = Job("hang", trouble(fmus, 5), tmp_path / "hang.csv", 1.0, step=0.1)
+    with pytest.raises(RunStoppedError, match=r"stopped by the user at t = 0\.5 s") as caught:
+        run_jobs([job], watch, lambda: told.append("stopping"))
+    took = time.monotonic() - pressed[0]
+    thread.join()
+    assert took < patience
+    assert caught.value.interrupted
+    assert told == ["stopping"]
+    assert [path.name for path in tmp_path.iterdir()] == ["hang.csv"]
+    assert len((tmp_path / "hang.csv").read_text().splitlines()) == 7
+
+
+def test_failure_is_told_also_when_the_other_hangs(fmus: dict[str, Path], tmp_path: Path) -> None:
+    jobs = [Job(f"way {way}", trouble(fmus, way), tmp_path / f"{way}.csv", 1.0, step=0.1) for way in (5, 8)]
+    with pytest.raises(RunStoppedError, match="the bearing has seized"):
+        run_jobs(jobs, silent)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["5.csv", "8.csv"]
+    assert len((tmp_path / "5.csv").read_text().splitlines()) == 7
+
+
+def test_children_leave_ctrl_c_to_their_parent_from_the_start(decay: System, tmp_path: Path) -> None:
+    finished = threading.Event()
+    hit: set[int | None] = set()
+
+    def press() -> None:
+        while not finished.wait(0.002):
+            for child in multiprocessing.active_children():
+                if child.pid is not None:
+                    os.kill(child.pid, signal.SIGINT)
+                    hit.add(child.pid)
+
+    thread = threading.Thread(target=press)
+    thread.start()
+    try:
+        outcomes = run_jobs([Job("a", decay, tmp_path / "a.csv", 1.0, step=0.01)], silent)
+    finally:
+        finished.set()
+        thread.join()
+    assert len(outcomes["a"].results) == 101
+    assert hit
 
 
 def test_ctrl_c_ends_all_jobs_and_keeps_their_results(decay: System, tmp_path: Path) -> None:

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import errno
 import math
 import os
 import signal
 import sys
 import tempfile
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy
@@ -15,8 +17,10 @@ from slave_building import build
 
 from attitude_fmu.cosim.errors import ResultsError, RunStoppedError, SystemRefusedError
 from attitude_fmu.cosim.master import Order, simulate
-from attitude_fmu.cosim.recording import Recording, read_csv, rescue, write_csv
+from attitude_fmu.cosim.recording import Recording, read_csv, read_rows, rescue, write_csv
+from attitude_fmu.cosim.slave import Slave
 from attitude_fmu.cosim.system import Component, System, connect
+from attitude_fmu.cosim.workspace import whole_or_not
 
 JACOBI: Order = "jacobi"
 GAUSS_SEIDEL: Order = "gauss-seidel"
@@ -111,6 +115,56 @@ def test_interval_thins_the_record_and_keeps_the_end(decay: System) -> None:
 def test_impossible_times_are_refused(decay: System, step: float, stop: float) -> None:
     with pytest.raises(SystemRefusedError, match="wanted"):
         simulate(decay, step=step, stop_time=stop)
+
+
+@pytest.mark.parametrize(("step", "interval"), [(1e-300, None), (1e-12, None), (0.1, math.nan), (0.1, 0.0)])
+def test_impossible_steps_and_intervals_are_refused(decay: System, step: float, interval: float | None) -> None:
+    with pytest.raises(SystemRefusedError, match="too small for 1 s|a multiple of the step"):
+        simulate(decay, step=step, interval=interval)
+    with pytest.raises(SystemRefusedError, match="order = newton: not one of jacobi, gauss-seidel"):
+        simulate(decay, order="newton")  # type: ignore[arg-type]
+
+
+def test_last_step_is_as_long_as_what_is_left(fmus: dict[str, Path]) -> None:
+    system = System("ramp", (Component("ramp", fmus["integrator"]),)).with_values("v", {"ramp.drive": 1.0})
+    assert simulate(system, step=0.3, stop_time=1.0).results["ramp.x"][-1] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_first_row_is_that_after_initialisation(fmus: dict[str, Path]) -> None:
+    assert simulate(troublemaker(fmus, 0), step=0.5).results["motor.exited"].tolist() == [1, 1, 1]
+
+
+def test_whole_number_reaches_a_switch_as_0_or_1(fmus: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    system = System(
+        "switches",
+        (Component("a", fmus["switchboard"]), Component("b", fmus["switchboard"])),
+        connect("a", "b", ("steps", "switch_in")),
+    )
+    sent: list[int] = []
+    close = Slave.close
+
+    def look(slave: Slave) -> None:
+        sent.extend(int(feed.buffer[0]) for feed in slave.feeds)
+        close(slave)
+
+    monkeypatch.setattr(Slave, "close", look)
+    simulate(system, step=0.1, stop_time=0.3)
+    assert sent == [1]
+
+
+def test_each_fmu_is_quoted_with_its_own_words(fmus: dict[str, Path]) -> None:
+    others = tuple(Component(name, fmus["gain"]) for name in ("first", "last"))
+    trouble = troublemaker(fmus, 1)
+    system = replace(trouble, components=(others[0], *trouble.components, others[1]))
+    with pytest.raises(RunStoppedError, match="motor: fmi2DoStep .* the bearing has seized"):
+        simulate(system, step=0.1)
+    with pytest.raises(RunStoppedError, match="motor: start values refused: .*no bearing"):
+        simulate(system.with_values("refusing", {"motor.way": 7}), step=0.1)
+
+
+def test_output_that_is_no_number_is_warned_of(fmus: dict[str, Path]) -> None:
+    (warning,) = simulate(troublemaker(fmus, 6), step=0.1).warnings
+    assert warning == "motor: y is not a finite number at t = 0.6 s"
 
 
 def test_record_takes_names_and_wildcards(decay: System) -> None:
@@ -222,6 +276,70 @@ def test_ctrl_c_keeps_the_results(fmus: dict[str, Path], tmp_path: Path) -> None
     assert signal.getsignal(signal.SIGINT) is before
 
 
+def test_ctrl_c_tells_the_time_of_the_last_row(decay: System) -> None:
+    def press(time: float) -> None:
+        if time > 0.35:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(RunStoppedError, match=r"stopped by the user at t = 0\.25 s") as caught:
+        simulate(decay, step=0.05, interval=0.25, progress=press)
+    assert caught.value.time == caught.value.results["time"][-1] == 0.25
+
+
+def test_failed_writing_leaves_the_earlier_file(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("earlier")
+
+    def write_half() -> None:
+        with whole_or_not(path) as draft:
+            draft.write_text("half")
+            raise OSError("disk full")
+
+    with pytest.raises(ResultsError, match="cannot write"):
+        write_half()
+    assert path.read_text() == "earlier"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_rows_of_very_many_columns_can_be_read(tmp_path: Path) -> None:
+    path = tmp_path / "r.partial.npy"
+    names = [f"component.a_rather_long_name[{number}]" for number in range(1000)]
+    recording = Recording(np.dtype([("time", "f8"), *[(name, "f8") for name in names]]), 3, path)
+    recording.times[:2] = [0.0, 0.1]
+    recording.close(keep_file=True)
+    rows = read_rows(path)
+    assert rows is not None
+    assert rows["time"].tolist() == [0.0, 0.1]
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(ResultsError, match="cannot read the rows"):
+        read_rows(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="this system cannot promise room on a disk")
+def test_full_disk_shows_before_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+
+    def full(_file: int, _start: int, size: int) -> None:
+        asked.append(size)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    path = tmp_path / "r.partial.npy"
+    with pytest.raises(ResultsError, match=r"cannot keep 0\.8 MB of results in .*No space left"):
+        Recording(np.dtype([("time", "f8"), ("y", "f8", 9)]), 10_000, path)
+    assert asked[0] > 800_000
+    assert not path.exists()
+
+
+def test_refused_start_leaves_the_earlier_results(fmus: dict[str, Path], tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("earlier")
+    with pytest.raises(RunStoppedError, match="start values refused"):
+        simulate(troublemaker(fmus, 7), step=0.1, results=path)
+    assert path.read_text() == "earlier"
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def test_nothing_is_left_behind(decay: System, tmp_path: Path) -> None:
     paths, modules = list(sys.path), set(sys.modules)
     simulate(decay, step=0.1, workspace=tmp_path)
@@ -278,7 +396,11 @@ def test_rows_of_a_crashed_run_can_be_rescued(tmp_path: Path) -> None:
     recording = Recording(np.dtype([("time", "f8"), ("y", "f8")]), 1000, path)
     recording.rows["y"][:3] = [1.0, 2.0, 3.0]
     recording.times[:3] = [0.0, 0.1, 0.2]
-    rows = rescue(path)
+    with pytest.raises(ResultsError, match=r"cannot write .*the rows are kept in .*r\.partial\.npy"):
+        rescue(path, tmp_path / "missing" / "r.csv")
+    assert path.is_file()
+    rows = rescue(path, tmp_path / "r.csv")
     assert rows is not None
     assert rows["y"].tolist() == [1.0, 2.0, 3.0]
-    assert rescue(path) is None
+    assert read_csv(tmp_path / "r.csv")["y"].tolist() == [1.0, 2.0, 3.0]
+    assert rescue(path, tmp_path / "r.csv") is None

@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from attitude_fmu.cosim.interface import read_interface
-from attitude_fmu.cosim.plot import plot
+from attitude_fmu.cosim.plot import Picture, plot
 from attitude_fmu.cosim.recording import Results
 from attitude_fmu.cosim.report import Report, Roles, angle_errors, jitter, report, roles_of, table, wrapped
 from attitude_fmu.cosim.system import Component, System
@@ -89,6 +89,20 @@ def test_turning_through_north_is_no_jitter() -> None:
     assert value.rms == pytest.approx(1e-6, rel=1e-3)
 
 
+def test_too_coarse_a_record_gives_no_jitter() -> None:
+    numbers = report(results(step=0.02), 1.0, ROLES, {})
+    assert numbers.jitter is None
+    assert "Recorded too coarsely for jitter: every 0.02 s" in shown(numbers)
+    assert report(results(step=0.01), 1.0, ROLES, {}).jitter is not None
+
+
+def test_loop_that_was_not_aligned_is_told_briefly() -> None:
+    numbers = report(results(duration=1.0), 1.0, ROLES, {})
+    text = " ".join(shown(numbers).split())
+    assert "did not finish its alignment" in text
+    assert "plant.euler" not in text
+
+
 def test_too_short_for_an_exposure_gives_no_jitter() -> None:
     assert jitter(results(), "plant", 9.5) is None
 
@@ -102,7 +116,7 @@ def test_table_and_picture_of_a_loop(tmp_path: Path, aligned: bool) -> None:
     text = shown(numbers)
     assert ("line-of-sight jitter, loop off" in text) == aligned
     assert ("did not finish its alignment" in text) == (not aligned)
-    plot(tmp_path / "p.png", "title", "subtitle", rows, ROLES, numbers, {}, loop_off=rows)
+    plot(tmp_path / "p.png", Picture("title", ("subtitle", "set: x"), rows, ROLES, numbers, {}, loop_off=rows))
     assert (tmp_path / "p.png").stat().st_size > 10_000
 
 
@@ -118,4 +132,4 @@ def test_system_of_other_parts_gets_a_summary(fmus: dict[str, Path], tmp_path: P
     assert (level.smallest, level.mean, level.largest) == (-1.0, 2.0, 4.0)
     assert odd.mean == pytest.approx(2.0 / 3.0)
     assert "board.level" in shown(numbers)
-    assert plot(tmp_path / "p.png", "other", "", rows, roles, numbers, interfaces).is_file()
+    assert plot(tmp_path / "p.png", Picture("other", (), rows, roles, numbers, interfaces)).is_file()

@@ -9,10 +9,11 @@ import pytest
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd
 from lxml import etree
+from slave_building import METRE, with_units
 
 from attitude_fmu.cosim.errors import ResultsError, SystemRefusedError
 from attitude_fmu.cosim.master import simulate
-from attitude_fmu.cosim.ssp import open_ssp, read_ssv, write_ssp, write_ssv
+from attitude_fmu.cosim.ssp import SSC, open_ssp, read_ssv, write_ssp, write_ssv
 from attitude_fmu.cosim.system import Component, System, check, connect, parameters_used, start_values
 
 
@@ -102,6 +103,72 @@ def test_two_fmus_of_one_file_name_both_fit(fmus: dict[str, Path], tmp_path: Pat
     system = System("s", (Component("a", fmus["gain"]), Component("b", other)), stop_time=1.0)
     with open_ssp(write_ssp(system, tmp_path / "s.ssp")) as back:
         assert len({component.fmu for component in back.components}) == 2
+
+
+def test_names_that_look_alike_keep_their_own_values(fmus: dict[str, Path], tmp_path: Path) -> None:
+    odd = tmp_path / "my gain ä.fmu"
+    odd.write_bytes(fmus["gain"].read_bytes())
+    names = ("gyro ä", "gyro ö", "b c", "b_c", "B_C")
+    values = {f"{name}.k": float(number) for number, name in enumerate(names)}
+    components = tuple(Component(name, odd if number % 2 else fmus["gain"]) for number, name in enumerate(names))
+    path = write_ssp(System("s", components).with_values("set", values), tmp_path / "s.ssp")
+    with zipfile.ZipFile(path) as archive:
+        members = [name.lower() for name in archive.namelist()]
+    assert len(set(members)) == len(members) == 1 + 2 + len(names)
+    with open_ssp(path) as back:
+        assert {str(port): value for port, value in start_values(back, check(back)).items()} == values
+
+
+@pytest.mark.parametrize(
+    "source", ["./resources/switchboard.fmu", "resources/%73witchboard.fmu", "x/../resources/switchboard.fmu"]
+)
+def test_source_is_a_uri(board: System, tmp_path: Path, source: str) -> None:
+    path = edited(write_ssp(board, tmp_path / "b.ssp"), "resources/switchboard.fmu", source)
+    with open_ssp(path) as back:
+        assert back.components[0].fmu.read_bytes() == board.components[0].fmu.read_bytes()
+
+
+def test_units_are_written(fmus: dict[str, Path], tmp_path: Path) -> None:
+    fmu = with_units(fmus["gain"], tmp_path / "metric.fmu", METRE.replace('"m"', '"metre"', 1), "metre")
+    text = structure(write_ssp(System("s", (Component("a", fmu),)), tmp_path / "s.ssp"))
+    assert 'unit="metre"' in text
+    root = etree.fromstring(text.encode())
+    (unit,) = root.iter("{*}Unit")
+    assert unit.get("name") == "metre"
+    assert dict(unit[0].attrib) == {"m": "1"}
+
+
+@pytest.mark.parametrize(
+    ("units", "unit", "message"),
+    [
+        ("", "m", "parameter a.k is given in m, which the set does not define"),
+        (
+            '<ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:Unit>',
+            "mm",
+            r"a\.k is given in mm, not in m; .*0\.001 \* value",
+        ),
+        (
+            '<ssc:Unit name="K"><ssc:BaseUnit K="1"/></ssc:Unit>',
+            "K",
+            r"a\.k is given in K, not in m; .*different quantities",
+        ),
+        ('<ssc:Unit name="metre"><ssc:BaseUnit m="1"/></ssc:Unit>', "metre", None),
+    ],
+)
+def test_unit_of_a_value_is_that_of_its_variable(
+    fmus: dict[str, Path], tmp_path: Path, units: str, unit: str, message: str | None
+) -> None:
+    fmu = with_units(fmus["gain"], tmp_path / "metric.fmu", METRE, "m")
+    text = SET.format(f'<ssv:Parameter name="a.k"><ssv:Real value="7" unit="{unit}"/></ssv:Parameter>')
+    if units:
+        text = text.replace("</ssv:Parameters>", f'</ssv:Parameters><ssv:Units xmlns:ssc="{SSC}">{units}</ssv:Units>')
+    (tmp_path / "u.ssv").write_text(text)
+    system = System("s", (Component("a", fmu),))
+    if message is None:
+        check(system.with_set(read_ssv(tmp_path / "u.ssv")))
+    else:
+        with pytest.raises(SystemRefusedError, match=message):
+            check(system.with_set(read_ssv(tmp_path / "u.ssv")))
 
 
 def test_fmpy_runs_what_we_write_and_agrees(fmus: dict[str, Path], tmp_path: Path) -> None:

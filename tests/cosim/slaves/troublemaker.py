@@ -1,6 +1,9 @@
-"""Goes wrong in a chosen way at a chosen time: 0 not at all, 1 raises, 2 discards, 3 warns, 4 kills the process."""
+"""Goes wrong in a chosen way at a chosen time: 0 not at all, 1 raises, 2 discards, 3 warns, 4 kills the process,
+5 never comes back, 6 gives NaN, 7 refuses to start, 8 raises after a while.
+"""
 
 import os
+import time
 
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Integer, Real
 from pythonfmu.enums import Fmi2Status
@@ -12,10 +15,19 @@ class Troublemaker(Fmi2Slave):
         self.way = 0
         self.when = 0.5
         self.y = 0.0
+        self.exited = 0
         fixed = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.fixed}
         self.register_variable(Integer("way", initial=Fmi2Initial.exact, **fixed))
         self.register_variable(Real("when", initial=Fmi2Initial.exact, **fixed))
         self.register_variable(Real("y", causality=Fmi2Causality.output, initial=Fmi2Initial.calculated))
+
+        shown = {"causality": Fmi2Causality.output, "initial": Fmi2Initial.calculated}
+        self.register_variable(Integer("exited", variability=Fmi2Variability.discrete, **shown))
+
+    def exit_initialization_mode(self):
+        self.exited = 1
+        if self.way == 7:
+            raise ValueError("no bearing")
 
     def do_step(self, current_time, step_size):
         self.y = current_time + step_size
@@ -24,7 +36,9 @@ class Troublemaker(Fmi2Slave):
         return True
 
     def misbehave(self):
-        if self.way == 1:
+        if self.way == 8:
+            time.sleep(1.5)
+        if self.way in (1, 8):
             self.log("the bearing has seized at 100%% load", Fmi2Status.error, "logStatusError")
             raise ValueError("seized")
         if self.way == 2:
@@ -35,4 +49,8 @@ class Troublemaker(Fmi2Slave):
             self.way = 0
         if self.way == 4:
             os._exit(139)
+        if self.way == 5:
+            time.sleep(1e4)
+        if self.way == 6:
+            self.y = float("nan")
         return True

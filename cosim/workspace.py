@@ -1,0 +1,75 @@
+"""Files and folders of a run: where FMUs are unpacked, and how a file is written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from .errors import ResultsError
+
+_SAFE_PATH = re.compile(r"[A-Za-z0-9_./\\:~-]+")
+
+
+@contextmanager
+def whole_or_not(path: Path) -> Iterator[Path]:
+    """A file beside `path` to write to; it takes the place of `path` when all went well, else it is removed.
+
+    Raises `ResultsError` if the disk does not take it.
+    """
+    draft = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        yield draft
+        draft.replace(path)
+    except OSError as error:
+        raise ResultsError(f"cannot write {path}: {error.strerror or error}") from error
+    finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def fmu_folder(workspace: Path | None) -> Iterator[Path]:
+    """A folder for the unpacked FMUs, removed afterwards together with what it left in the interpreter.
+
+    Raises `ResultsError` if none can be made.
+    """
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="attitude_fmu_", dir=safe_folder(workspace)))
+    except OSError as error:
+        raise ResultsError(f"no folder to unpack FMUs: {error}") from error
+    try:
+        yield folder
+    finally:
+        _forget_modules(folder)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def safe_folder(workspace: Path | None = None) -> Path:
+    """A folder for temporary files whose name is plain: `workspace` if given, else the system's own or another.
+
+    FMUs made with pythonfmu crash the host when their path needs escaping in a URI.
+    Raises `ResultsError` if there is none.
+    """
+    candidates = [workspace] if workspace else [Path(tempfile.gettempdir()), Path("/tmp"), Path.cwd(), Path.home()]
+    for candidate in candidates:
+        if _SAFE_PATH.fullmatch(str(candidate.resolve())) and candidate.is_dir():
+            return candidate.resolve()
+    raise ResultsError(
+        f"no folder for temporary files has a plain name (tried {candidates[0]}); set TMPDIR to one made of letters, "
+        "digits, '-' and '_'"
+    )
+
+
+def _forget_modules(folder: Path) -> None:
+    """Take back what FMUs in Python imported from `folder`, so that the next run gets its own code."""
+    inside = str(folder)
+    sys.path[:] = [entry for entry in sys.path if not entry.startswith(inside)]
+    for name, module in list(sys.modules.items()):
+        if (getattr(module, "__file__", None) or "").startswith(inside):
+            del sys.modules[name]
