@@ -553,18 +553,18 @@ def outputs(state: State, _p: Parameters, _k: Coefficients) -> Outputs:
 
 def rules(p: Parameters, instance: str) -> None:
     """Raise `ValueRefusedError` where range and resolution do not fit the part's register word."""
-    for name, full_scale, resolution, bits in (
-        ("gyro", p.gyro.range, p.gyro.resolution, gyros.WORD_LENGTH),
-        ("accelerometer", p.accelerometer.range, p.accelerometer.resolution, accelerometers.WORD_LENGTH),
+    for name, full_scale, resolution, unit, bits in (
+        ("gyro", p.gyro.range, p.gyro.resolution, "rad/s", gyros.WORD_LENGTH),
+        ("accelerometer", p.accelerometer.range, p.accelerometer.resolution, "m/s2", accelerometers.WORD_LENGTH),
     ):
         codes = 2.0 ** (bits - 1)
         if full_scale > codes * resolution * (1.0 + 1e-9):
             raise ValueRefusedError(
                 f"{instance}.{name}.range",
                 full_scale,
-                "",
+                unit,
                 f"the register word ends at {codes:.0f} LSB of {name}.resolution",
-                f"up to {codes * resolution:.9g}",
+                f"up to {codes * resolution:.9g} {unit}",
             )
 
 
