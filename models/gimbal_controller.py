@@ -64,7 +64,7 @@ class Stabilise(NamedTuple):
     integral: Annotated[
         float, Real("Hz", "frequency below which the rate loop's integral acts", 0.0, 50.0, tunable=True)
     ] = 3.0
-    attitude_bandwidth: Annotated[float, Real("Hz", "crossover of the attitude loop", 0.0, 50.0, tunable=True)] = 0.7
+    attitude_bandwidth: Annotated[float, Real("Hz", "crossover of the attitude loop", 0.0, 50.0, tunable=True)] = 2.0
     rate_limit: Annotated[
         float, Real("rad/s", "largest rate asked for, on each body axis", 0.0, 20.0, "deg/s", tunable=True)
     ] = 1.0
