@@ -131,7 +131,6 @@ class Coefficients(NamedTuple):
     C_sb: Annotated[Matrix3, Real("1", "body into sensor coordinates")]
     gyro: GyroCoefficients
     accelerometer: AccelerometerCoefficients
-    slow_period: Annotated[float, Real("s", "time between steps of temperature and bias instability")]
     processor_period: Annotated[float, Real("s", "true time between readings of the registers")]
     alignment_samples: Annotated[float, Integer("readings averaged in the alignment")]
     nulled_deviation: Annotated[float, Real("rad/s", "standard deviation of a bias nulled in the alignment")]
@@ -249,11 +248,10 @@ def coefficients(p: Parameters) -> Coefficients:
         C_sb=mounting,
         gyro=gyros.gyro_coefficients(p.gyro, mounting, p.ideal),
         accelerometer=accelerometers.accelerometer_coefficients(p.accelerometer, mounting, p.ideal),
-        slow_period=1.0 * SLOW_PERIOD,
         processor_period=p.processor.period / (1.0 + where(p.ideal > 0.5, 0.0, p.processor.clock_error)),
         alignment_samples=samples,
         nulled_deviation=averaged,
-        filter_divider=where(p.filter.kind < 1.5, 1.0, 1.0 * p.filter.divider),
+        filter_divider=where(p.filter.kind == FILTER.value("none"), 1.0, 1.0 * p.filter.divider),
     )
 
 
@@ -547,7 +545,11 @@ def outputs(state: State, _p: Parameters, _k: Coefficients) -> Outputs:
         ),
         die_temperature=DieTemperatureOutputs(state.slow.gyro_temperature, state.slow.accelerometer_temperature),
         aligned=attitude.aligned > 0.5,
-        status=where(attitude.aligned > 0.5, where(beyond > 0.5, 3.0, 2.0), 1.0),
+        status=where(
+            attitude.aligned > 0.5,
+            where(beyond > 0.5, STATUS.value("over_range"), STATUS.value("running")),
+            STATUS.value("aligning"),
+        ),
     )
 
 
@@ -584,7 +586,7 @@ MODEL = Model(
     initial_state=initial_state,
     outputs=outputs,
     clocks=(
-        Clock("slow", lambda k: k.slow_period),
+        Clock("slow", lambda _k: SLOW_PERIOD),
         Clock("gyro_1", lambda k: k.gyro.sense_period[0]),
         Clock("gyro_2", lambda k: k.gyro.sense_period[1]),
         Clock("gyro_3", lambda k: k.gyro.sense_period[2]),
@@ -616,13 +618,21 @@ MODEL = Model(
         Task(
             "solve",
             "processor",
-            {1: _solver(_levelling), 2: _solver(_gyro_only), 3: _solver(_fused)},
+            {
+                SOLVER.value("levelling"): _solver(_levelling),
+                SOLVER.value("gyro"): _solver(_gyro_only),
+                SOLVER.value("fused"): _solver(_fused),
+            },
             choice=lambda p: p.solver.kind,
         ),
         Task(
             "filter",
             "processor",
-            {1: _filter(_unfiltered), 2: _filter(_rc), 3: _filter(_kalman)},
+            {
+                FILTER.value("none"): _filter(_unfiltered),
+                FILTER.value("rc"): _filter(_rc),
+                FILTER.value("kalman"): _filter(_kalman),
+            },
             choice=lambda p: p.filter.kind,
             every=lambda k: int(k.filter_divider),
         ),

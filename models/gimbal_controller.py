@@ -275,7 +275,11 @@ def outputs(state: State, p: Parameters, _c: Coefficients) -> Outputs:
     """The torques of the last tick."""
     return Outputs(
         motor_torque=state.torque,
-        status=where(state.engaged > 0.5, 3.0, where(p.mode > 1.5, 2.0, 1.0)),
+        status=where(
+            state.engaged > 0.5,
+            STATUS.value("attitude_held"),
+            where(p.mode == MODE.value("off"), STATUS.value("off"), STATUS.value("joints_held")),
+        ),
         saturated=state.saturated > 0.5,
     )
 
@@ -292,6 +296,17 @@ MODEL = Model(
     initial_state=initial_state,
     outputs=outputs,
     clocks=(Clock("controller", lambda c: c.period),),
-    tasks=(Task("control", "controller", {1: rest, 2: hold_joints, 3: stabilise}, choice=lambda p: int(p.mode)),),
+    tasks=(
+        Task(
+            "control",
+            "controller",
+            {
+                MODE.value("off"): rest,
+                MODE.value("hold_joints"): hold_joints,
+                MODE.value("stabilise"): stabilise,
+            },
+            choice=lambda p: int(p.mode),
+        ),
+    ),
     seed=lambda _p: 0,
 )

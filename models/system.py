@@ -22,6 +22,9 @@ add up rounded steps."""
 SHORTEST_PERIOD = 1e-6
 """Shortest period of a clock, s; a shorter one is a slip that would keep a host busy for ever."""
 
+STOPPED = 1e12
+"""Period of a clock that stands still, s."""
+
 Step = Callable[[Any, Any, Any, Any, tuple[Any, ...]], Any]
 
 

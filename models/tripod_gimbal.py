@@ -247,9 +247,14 @@ def _wind_force(state_wind: WindState, deflection: Axes, p: Parameters, c: Coeff
     return multiply_transposed(_head_attitude(deflection, p), force_n)
 
 
+def _head_euler(deflection: Axes, p: Parameters) -> Euler:
+    """The head's yaw, pitch and roll against n."""
+    return Euler(p.initial.heading + deflection[0], deflection[1], deflection[2])
+
+
 def _head_attitude(deflection: Axes, p: Parameters) -> Matrix3:
     """C_nt."""
-    return matrix_from_euler(Euler(p.initial.heading + deflection[0], deflection[1], deflection[2]))
+    return matrix_from_euler(_head_euler(deflection, p))
 
 
 def _wind_share(state: State, c: Coefficients, steps: Scalar) -> Scalar:
@@ -366,11 +371,11 @@ def outputs(state: State, p: Parameters, c: Coefficients) -> Outputs:
     r = p.sensor_position
     felt = add(to_camera(turns, at_o), add(cross(alpha, r), cross(w, cross(w, r))))
     _, speed = wind_now(p.wind, c.wind, state.wind, _wind_share(state, c, 0.0))
-    head = Euler(p.initial.heading + state.deflection.yaw, state.deflection.pitch, state.deflection.roll)
+    head = quaternion_from_euler(_head_euler(state.deflection, p))
     joint = quaternion_from_euler(Euler(*state.joint))
     return Outputs(
         euler=euler_from_matrix(c_nb),
-        quaternion=normalised(quaternion_product(quaternion_from_euler(head), joint)),
+        quaternion=normalised(quaternion_product(head, joint)),
         rate=add(w, earth),
         angular_acceleration=subtract(alpha, cross(w, earth)),
         specific_force=felt,

@@ -10,12 +10,12 @@ from typing import Annotated, Any, NamedTuple
 
 from ..record import Boolean, Enumeration, Integer, Item, Matrix3, Real, Vector3
 from ..scalar import PI, Scalar, maximum, minimum, round_half_up, where
+from ..system import STOPPED
 from ..vectors import add, cross, each_axis, multiply, scale
 from . import devices
 from .bandwidth import low_pass, low_pass_gain
 from .bias_instability import SIGMA_PER_INSTABILITY
 from .digital_filter import sinc2_decimated
-from .gyro import STOPPED
 from .quantiser import over_range, register_code
 from .sensitivity import sensitivity_matrix
 from .thermal import ThermalParameters
@@ -109,9 +109,8 @@ def _decimation(odr: Scalar) -> Scalar:
 def _latency(part: AccelerometerParameters, decimation: Scalar) -> Scalar:
     """Sense periods to add so that the delay is first_stage + 1.5 (R - 1)/fs, at most one output period.
 
-    That delay fits the table of Rev. D p. 26 within 1.6 % (calculated).
-
-    The window itself delays by R/fs, the analogue filter by 1/(2 pi f).
+    That delay fits the table of Rev. D p. 26 within 1.6 % (calculated). The window itself delays by R/fs, the
+    analogue filter by 1/(2 pi f).
     """
     missing = part.first_stage_delay - 1.0 / (2.0 * PI * part.bandwidth)
     ticks = round_half_up(missing * part.sampling_frequency + 0.5 * (decimation - 1.0) - 1.0)
@@ -121,7 +120,7 @@ def _latency(part: AccelerometerParameters, decimation: Scalar) -> Scalar:
 def accelerometer_coefficients(
     part: AccelerometerParameters, mounting: Matrix3, ideal: Any
 ) -> AccelerometerCoefficients:
-    """Coefficients of the part; an ideal one has a stopped clock."""
+    """Coefficients of the part; an ideal one is read directly, its clock stands still."""
     frequency = part.sampling_frequency * (1.0 + part.clock_error)
     decimation = _decimation(part.output_data_rate)
     return AccelerometerCoefficients(

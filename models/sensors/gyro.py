@@ -11,6 +11,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ..record import Boolean, Integer, Matrix3, Real, Vector3
 from ..scalar import Scalar, where
+from ..system import STOPPED
 from ..vectors import dot, each_axis, matrix_product
 from . import devices
 from .bandwidth import low_pass, low_pass_gain
@@ -27,9 +28,6 @@ from .quantiser import over_range, register_code
 from .sensitivity import sensitivity_matrix
 from .thermal import ThermalParameters
 from .white_noise import block_sums, sample_deviation
-
-STOPPED = 1e12
-"""Period of a clock that stands still, s: an ideal part is read directly."""
 
 _SHEET = devices.ADXRS450
 WORD_LENGTH = int(_SHEET.word_length.value)
@@ -98,7 +96,7 @@ class GyroState(NamedTuple):
 
 
 def gyro_coefficients(gyro: GyroParameters, mounting: Matrix3, ideal: Any) -> GyroCoefficients:
-    """Coefficients of the triad; an ideal one has stopped clocks."""
+    """Coefficients of the triad; an ideal one is read directly, its clocks stand still."""
     perfect = ideal > 0.5
     frequency = each_axis(lambda i: gyro.resonator_frequency * (1.0 + gyro.clock_error[i]))
     period = each_axis(lambda i: SAMPLES_PER_SENSE / frequency[i])
