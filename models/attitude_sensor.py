@@ -28,7 +28,6 @@ from .attitude.rotations import (
     matrix_from_quaternion,
 )
 from .attitude.velocity_aided import Fused, FusionParameters, FusionState, RestState, fused_step, initial_fusion
-from .errors import ValueRefusedError
 from .filters.kalman import KalmanParameters, kalman_filtered
 from .filters.rc import RcParameters, rc_filtered
 from .record import Boolean, Enumeration, Integer, Item, Matrix3, Quaternion, Real, Vector3, choose
@@ -40,7 +39,7 @@ from .sensors.accelerometer import AccelerometerCoefficients, AccelerometerParam
 from .sensors.gyro import GyroCoefficients, GyroParameters, GyroState
 from .sensors.sensitivity import offset_at
 from .sensors.thermal import die_temperature, initial_die_temperature
-from .system import Clock, Model, Task
+from .system import Clock, Model, Rule, Task
 from .vectors import ZERO3, add, each_axis, multiply, multiply_transposed, scale, subtract, transpose
 
 SLOW_PERIOD = 0.1
@@ -553,21 +552,17 @@ def outputs(state: State, _p: Parameters, _k: Coefficients) -> Outputs:
     )
 
 
-def rules(p: Parameters, instance: str) -> None:
-    """Raise `ValueRefusedError` where range and resolution do not fit the part's register word."""
-    for name, full_scale, resolution, unit, bits in (
-        ("gyro", p.gyro.range, p.gyro.resolution, "rad/s", gyros.WORD_LENGTH),
-        ("accelerometer", p.accelerometer.range, p.accelerometer.resolution, "m/s2", accelerometers.WORD_LENGTH),
-    ):
-        codes = 2.0 ** (bits - 1)
-        if full_scale > codes * resolution * (1.0 + 1e-9):
-            raise ValueRefusedError(
-                f"{instance}.{name}.range",
-                full_scale,
-                unit,
-                f"the register word ends at {codes:.0f} LSB of {name}.resolution",
-                f"up to {codes * resolution:.9g} {unit}",
-            )
+def _rules() -> tuple[Rule, ...]:
+    """Range and resolution must fit the parts' register words."""
+
+    def longest(part: str, bits: int) -> Callable[[Parameters], tuple[Scalar, Scalar]]:
+        return lambda p: (0.0, 2.0 ** (bits - 1) * getattr(p, part).resolution * (1.0 + 1e-9))
+
+    parts = (("gyro", gyros.WORD_LENGTH), ("accelerometer", accelerometers.WORD_LENGTH))
+    why = "the register word ends at {codes} LSB of {part}.resolution"
+    return tuple(
+        Rule(f"{part}.range", why.format(codes=2 ** (bits - 1), part=part), longest(part, bits)) for part, bits in parts
+    )
 
 
 def _senses_per_register(_k: Coefficients) -> int:
@@ -611,7 +606,7 @@ MODEL = Model(
             "accelerometer_register",
             "accelerometer",
             accelerometer_register,
-            every=lambda k: int(k.accelerometer.decimation),
+            every=lambda k: k.accelerometer.decimation,
             normals=6,
         ),
         Task("acquire", "processor", acquire),
@@ -634,9 +629,9 @@ MODEL = Model(
                 FILTER.value("kalman"): _filter(_kalman),
             },
             choice=lambda p: p.filter.kind,
-            every=lambda k: int(k.filter_divider),
+            every=lambda k: k.filter_divider,
         ),
     ),
     seed=lambda p: p.seed,
-    rules=rules,
+    rules=_rules(),
 )

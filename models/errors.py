@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 
+def digits(value: float) -> str:
+    """A number as messages show it, the same from Python and C."""
+    return f"{value:.15g}"
+
+
 class AttitudeFmuError(Exception):
     """Base of every error that this package raises on purpose."""
 
@@ -17,8 +22,8 @@ class ValueRefusedError(InstanceError, ValueError):
     The message reads ``instance.variable = value unit: why (allowed range)``.
     """
 
-    def __init__(self, variable: str, value: object, unit: str, why: str, allowed: str) -> None:
-        shown = f"{value} {unit}".rstrip() if unit != "1" else str(value)
+    def __init__(self, variable: str, value: float, unit: str, why: str, allowed: str) -> None:
+        shown = digits(value) if unit == "1" else f"{digits(value)} {unit}"
         super().__init__(f"{variable} = {shown}: {why} (allowed: {allowed})")
         self.variable = variable
         self.value = value

@@ -305,7 +305,7 @@ MODEL = Model(
                 MODE.value("hold_joints"): hold_joints,
                 MODE.value("stabilise"): stabilise,
             },
-            choice=lambda p: int(p.mode),
+            choice=lambda p: p.mode,
         ),
     ),
     seed=lambda _p: 0,

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
-from .errors import ValueRefusedError
+from .errors import ValueRefusedError, digits
 from .scalar import Scalar, where
 
 
@@ -176,14 +176,20 @@ def allowed(fact: Fact) -> str:
         return "true, false"
     if isinstance(fact, Enumeration):
         return ", ".join(f"{i} {item.name}" for i, item in enumerate(fact.items, 1))
-    unit = "" if fact.unit == "1" else f" {fact.unit}"
-    if fact.min is None and fact.max is None:
-        return f"any finite number{unit}"
-    if fact.max is None:
-        return f"{fact.min}{unit} or more"
-    if fact.min is None:
-        return f"{fact.max}{unit} or less"
-    return f"{fact.min} to {fact.max}{unit}"
+    low, high = (fact.min, fact.max)
+    return allowed_range(-math.inf if low is None else low, math.inf if high is None else high, fact.unit)
+
+
+def allowed_range(low: float, high: float, unit: str) -> str:
+    """What lies between two limits, for people; infinite limits are none."""
+    shown = "" if unit == "1" else f" {unit}"
+    if low == -math.inf and high == math.inf:
+        return f"any finite number{shown}"
+    if high == math.inf:
+        return f"{digits(low)}{shown} or more"
+    if low == -math.inf:
+        return f"{digits(high)}{shown} or less"
+    return f"{digits(low)} to {digits(high)}{shown}"
 
 
 def refusal(leaf: Leaf, value: Any, instance: str) -> ValueRefusedError | None:

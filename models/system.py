@@ -8,12 +8,12 @@ master cuts time. A tick that falls on the end of a communication step belongs t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, NamedTuple
 
 from .errors import ModelStoppedError, ValueRefusedError
 from .noise import normals, stream_of
-from .record import check, flatten, leaves, unflatten
+from .record import allowed_range, check, flatten, leaves, unflatten
 
 TIME_TOLERANCE = 1e-9
 """Part of the time (at least of 1 s) by which a tick may lie past the end of a step and still belong to it: masters
@@ -32,8 +32,16 @@ def _once(_coefficients: Any) -> int:
     return 1
 
 
-def _no_rules(_parameters: Any, _instance: str) -> None:
-    return None
+class Rule(NamedTuple):
+    """A parameter's limits that follow from the others: ``low <= value <= high`` of ``limits(parameters)``.
+
+    `field` is its structured name, `why` tells what is wrong beyond them; an infinite limit is none. A rule may count
+    on the rules before it.
+    """
+
+    field: str
+    why: str
+    limits: Callable[[Any], tuple[Any, Any]]
 
 
 class Clock(NamedTuple):
@@ -53,8 +61,8 @@ class Task(NamedTuple):
     name: str
     clock: str
     step: Step | Mapping[int, Step]
-    choice: Callable[[Any], int] | None = None
-    every: Callable[[Any], int] = _once
+    choice: Callable[[Any], Any] | None = None
+    every: Callable[[Any], Any] = _once
     normals: int = 0
 
     def chosen(self, parameters: Any) -> Step:
@@ -78,8 +86,8 @@ class Model(NamedTuple):
     `coefficients`  ``(parameters) -> Coefficients``
     `initial_state` ``(parameters, coefficients, inputs) -> State``
     `outputs`       ``(state, parameters, coefficients) -> Outputs``
-    `seed`          ``(parameters) -> int``, the key of all its noise
-    `rules`         ``(parameters, instance)``, raises for values that do not go together
+    `seed`          ``(parameters)``, the whole number that is the key of all its noise
+    `rules`         limits of parameters that follow from other parameters
     ==============  ==========================================================================
     """
 
@@ -95,8 +103,20 @@ class Model(NamedTuple):
     outputs: Callable[[Any, Any, Any], Any]
     clocks: Sequence[Clock]
     tasks: Sequence[Task]
-    seed: Callable[[Any], int]
-    rules: Callable[[Any, str], None] = _no_rules
+    seed: Callable[[Any], Any]
+    rules: Sequence[Rule] = ()
+
+
+def check_rules(model: Model, parameters: Any, instance: str) -> None:
+    """Raise `ValueRefusedError` for the first parameter that does not go together with the others."""
+    values = dict(zip((leaf.name for leaf in leaves(model.Parameters)), flatten(parameters), strict=True))
+    for rule in model.rules:
+        low, high = rule.limits(parameters)
+        if not low <= values[rule.field] <= high:
+            unit = next(leaf.fact.unit for leaf in leaves(model.Parameters) if leaf.name == rule.field)
+            raise ValueRefusedError(
+                f"{instance}.{rule.field}", values[rule.field], unit, rule.why, allowed_range(low, high, unit)
+            )
 
 
 class _Scheduled(NamedTuple):
@@ -143,13 +163,13 @@ class Run:
                 period,
                 "s",
                 "the parameters give too short a period",
-                f"{SHORTEST_PERIOD} s or more",
+                allowed_range(SHORTEST_PERIOD, inf, "s"),
             )
         return period
 
     def _set_parameters(self, parameters: Any) -> None:
         check(self.model.Parameters, flatten(parameters), self.name)
-        self.model.rules(parameters, self.name)
+        check_rules(self.model, parameters, self.name)
         try:
             self.coefficients = self.model.coefficients(parameters)
         except (ArithmeticError, ValueError) as error:

@@ -10,6 +10,8 @@ half a step before and half a step after (Strang splitting).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import inf
 from typing import Annotated, NamedTuple
 
 from .attitude.rotations import (
@@ -25,7 +27,6 @@ from .attitude.rotations import (
     quaternion_product,
     turns_of,
 )
-from .errors import ValueRefusedError
 from .plants.friction import Friction, LuGre, bristle_after, friction_torque, lugre
 from .plants.gimbal import (
     NO_AXES,
@@ -47,8 +48,8 @@ from .plants.pulses import Knock, Shutter, knock_share, shutter_length, shutter_
 from .plants.tripod import Mount, Tripod, elastic_energy, mount, mount_motion
 from .plants.wind import Wind, WindCoefficients, WindState, wind_after, wind_coefficients, wind_now
 from .record import Integer, Matrix3, Quaternion, Real, Vector3
-from .scalar import PI, Scalar, floor, maximum, round_half_up, sqrt
-from .system import Clock, Model, Task
+from .scalar import PI, Scalar, floor, maximum, round_half_up, sqrt, where
+from .system import Clock, Model, Rule, Task
 from .vectors import ZERO3, add, cross, matrix_product, multiply_transposed, scale, subtract
 
 # The bodies are sized after a mirrorless camera of 0.7 kg with a lens of 0.5 kg in a small gimbal: uniform boxes and
@@ -404,77 +405,103 @@ def energy(state: State, p: Parameters, c: Coefficients) -> Scalar:
     return kinetic + elastic_energy(c.mount, state.deflection) + p.gravity * lifted
 
 
-def _fastest(p: Parameters, c: Coefficients) -> float:
+# --- values that must go together ------------------------------------------------------------------------------------
+
+_MARGIN = 1e-9
+"""Relative width of a limit: what is computed from decimal numbers may miss it by roundings."""
+
+
+def _fastest(p: Parameters) -> Scalar:
     """Upper bound of the fastest rate of springs, bristles and dampers, 1/s: sqrt(k/J) + C/J.
 
     J is the inertia that each is sure to move.
     """
+    c = coefficients(p)
     x, y, z = p.camera.inertia
-    rates = [
-        sqrt(k / i) + damping / i
-        for k, damping, i in zip(c.mount.stiffness, c.mount.damping, p.tripod.inertia, strict=True)
-    ]
+    fastest: Scalar = 0.0
+    for k, damping, inertia in zip(c.mount.stiffness, c.mount.damping, p.tripod.inertia, strict=True):
+        fastest = maximum(fastest, sqrt(k / inertia) + damping / inertia)
     for friction, inertia in zip(c.friction, (z, x, y), strict=True):
         damping = friction.damping + friction.viscous
-        rates.append(sqrt(friction.stiffness / inertia) + damping / inertia)
-    return float(max(rates))
+        fastest = maximum(fastest, sqrt(friction.stiffness / inertia) + damping / inertia)
+    return fastest
 
 
-def _tipping(p: Parameters, c: Coefficients) -> float:
+def _tipping(p: Parameters) -> Scalar:
     """Stiffness below which gravity tips the head over, N.m/rad: g sum(m (h + z))."""
-    return float(p.gravity * sum(body.mass * c.height + body.moment[2] for body in c.bodies))
+    c = coefficients(p)
+    outer, middle, inner = (body.mass * c.height + body.moment[2] for body in c.bodies)
+    return p.gravity * (outer + middle + inner)
 
 
-def _check_body(body: Body, name: str) -> None:
-    x, y, z = body.inertia
-    largest = max(x, y, z)
-    if largest > (x + y + z - largest) * (1.0 + 1e-9):
-        raise ValueRefusedError(
-            f"{name}.inertia", largest, "kg.m2", "larger than the other two together", "those of a rigid body"
-        )
-    xy, xz, yz = body.products
-    minors = (x * y - xy * xy, x * z - xz * xz, y * z - yz * yz)
-    if min(minors) <= 0.0 or x * minors[2] - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz) <= 0.0:
-        raise ValueRefusedError(
-            f"{name}.products", max(xy, xz, yz), "kg.m2", "too large for the moments", "those of a rigid body"
-        )
+def _moment_rule(name: str, axis: int) -> Rule:
+    def limits(p: Parameters) -> tuple[Scalar, Scalar]:
+        inertia = getattr(p, name).inertia
+        return 0.0, (inertia[axis - 1] + inertia[axis - 2]) * (1.0 + _MARGIN)
+
+    return Rule(f"{name}.inertia[{axis + 1}]", "larger than the other two together, as in no rigid body", limits)
 
 
-def _check_period(name: str, period: float, length: float, why: str) -> None:
-    if 0.0 < period < length:
-        raise ValueRefusedError(name, period, "s", why, f"0 or {length} s or more")
+def _product_rules(name: str) -> tuple[Rule, ...]:
+    """The inertia tensor is positive definite: what its minors leave for xy, xz and then yz."""
+
+    def around(centre: Scalar, square: Scalar) -> tuple[Scalar, Scalar]:
+        half = (1.0 - _MARGIN) * sqrt(maximum(square, 0.0))
+        return centre - half, centre + half
+
+    def xy_limits(p: Parameters) -> tuple[Scalar, Scalar]:
+        x, y, _ = getattr(p, name).inertia
+        return around(0.0, x * y)
+
+    def xz_limits(p: Parameters) -> tuple[Scalar, Scalar]:
+        x, _, z = getattr(p, name).inertia
+        return around(0.0, x * z)
+
+    def yz_limits(p: Parameters) -> tuple[Scalar, Scalar]:
+        (x, y, z), (xy, xz, _) = getattr(p, name).inertia, getattr(p, name).products
+        return around(xy * xz / x, (x * y - xy * xy) * (x * z - xz * xz) / (x * x))
+
+    why = "too large for the moments, as in no rigid body"
+    return tuple(
+        Rule(f"{name}.products[{i}]", why, limits) for i, limits in enumerate((xy_limits, xz_limits, yz_limits), 1)
+    )
 
 
-def rules(p: Parameters, instance: str) -> None:
+def _body_rules(name: str) -> tuple[Rule, ...]:
+    return (*[_moment_rule(name, axis) for axis in range(3)], *_product_rules(name))
+
+
+def _pulse_rule(name: str, length: Callable[[Parameters], Scalar], why: str) -> Rule:
+    def limits(p: Parameters) -> tuple[Scalar, Scalar]:
+        return where(getattr(p, name).period > 0.0, length(p), 0.0), inf
+
+    return Rule(f"{name}.period", why, limits)
+
+
+def _rules() -> tuple[Rule, ...]:
     """Bodies must be rigid, pulses must end before they start again, the tripod must stand, the step must be stable.
 
     A step times the fastest rate of 1 is half of what RK4 and the splitting bear.
     """
-    for name in ("yaw_frame", "pitch_frame", "camera"):
-        _check_body(getattr(p, name), f"{instance}.{name}")
-    _check_period(f"{instance}.shutter.period", p.shutter.period, shutter_length(p.shutter), "the exposure is not over")
-    _check_period(f"{instance}.knock.period", p.knock.period, p.knock.width, "the blow is not over")
-    c = coefficients(p)
-    least = _tipping(p, c)
-    for axis in ("pitch", "roll"):
-        stiffness = getattr(p.tripod.stiffness, axis)
-        if stiffness <= least:
-            raise ValueRefusedError(
-                f"{instance}.tripod.stiffness.{axis}",
-                stiffness,
-                "N.m/rad",
-                "the camera's weight tips the tripod over",
-                f"more than {least} N.m/rad",
-            )
-    longest = 1.0 / _fastest(p, c)
-    if p.solver_period > longest:
-        raise ValueRefusedError(
-            f"{instance}.solver_period",
-            p.solver_period,
-            "s",
-            "too long for the stiffness and damping of tripod and friction",
-            f"{longest} s or less",
+    standing = [
+        Rule(
+            f"tripod.stiffness.{axis}",
+            "the camera's weight tips the tripod over",
+            lambda p: (_tipping(p) * (1.0 + _MARGIN), inf),
         )
+        for axis in ("pitch", "roll")
+    ]
+    return (
+        *[rule for name in ("yaw_frame", "pitch_frame", "camera") for rule in _body_rules(name)],
+        _pulse_rule("shutter", lambda p: shutter_length(p.shutter), "0 switches it off; the exposure is not over"),
+        _pulse_rule("knock", lambda p: p.knock.width, "0 switches it off; the blow is not over"),
+        *standing,
+        Rule(
+            "solver_period",
+            "too long for the stiffness and damping of tripod and friction",
+            lambda p: (0.0, 1.0 / _fastest(p)),
+        ),
+    )
 
 
 MODEL = Model(
@@ -491,8 +518,8 @@ MODEL = Model(
     clocks=(Clock("solver", lambda c: c.solver_period),),
     tasks=(
         Task("integrate", "solver", integrate),
-        Task("wind", "solver", blow_on, every=lambda c: int(c.wind.every), normals=5),
+        Task("wind", "solver", blow_on, every=lambda c: c.wind.every, normals=5),
     ),
-    seed=lambda p: int(p.seed),
-    rules=rules,
+    seed=lambda p: p.seed,
+    rules=_rules(),
 )

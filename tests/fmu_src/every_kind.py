@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Annotated, Any, NamedTuple
 
-from attitude_fmu.models.errors import ValueRefusedError
 from attitude_fmu.models.record import Boolean, Enumeration, Integer, Item, Matrix3, Real, Vector3
-from attitude_fmu.models.scalar import where
-from attitude_fmu.models.system import Clock, Model, Task
+from attitude_fmu.models.scalar import both, where
+from attitude_fmu.models.system import Clock, Model, Rule, Task
 from attitude_fmu.models.vectors import IDENTITY3, ZERO3, add, multiply, scale
 
 SHAPE = Enumeration(
@@ -73,16 +73,15 @@ def initial_state(p: Parameters, c: Coefficients, u: Inputs) -> State:
 
 
 def _driven(x: State, u: Inputs, p: Parameters, c: Coefficients, normals: tuple[Any, ...]) -> Any:
-    sign = -1.0 if p.inverted else 1.0
+    sign = where(p.inverted > 0.5, -1.0, 1.0)
     noisy = add(multiply(p.mounting, u.rate), scale(c.sigma, normals))
-    return scale(sign * p.gain * (1.0 if u.switch else 0.0), noisy)
+    return scale(sign * p.gain * where(u.switch > 0.5, 1.0, 0.0), noisy)
 
 
 def lag(x: State, u: Inputs, p: Parameters, c: Coefficients, normals: tuple[Any, ...]) -> State:
-    if u.choice == 2 and u.steps == 10:
-        raise ZeroDivisionError("100 % broken %s %d")
+    breaks = where(both(u.choice > 1.5, u.steps > 9.5), 0.0, 1.0)
     filtered = add(scale(0.9, x.filtered), scale(0.1, _driven(x, u, p, c, normals)))
-    return State(filtered, x.drift, x.ticks + 1.0 + u.steps)
+    return State(filtered, x.drift, x.ticks + 1.0 / breaks + u.steps)
 
 
 def mean(x: State, u: Inputs, p: Parameters, c: Coefficients, normals: tuple[Any, ...]) -> State:
@@ -98,11 +97,6 @@ def outputs(x: State, p: Parameters, c: Coefficients) -> NamedOutputs:
     size = a * a + b * b + d * d
     high = where(size > 1.0, 2.0, 1.0)
     return NamedOutputs(Outputs((a + x.drift, b, d), x.ticks + p.shift, where(size > 0.0, 1.0, 0.0), high))
-
-
-def rules(p: Parameters, instance: str) -> None:
-    if not p.lower < p.gain:
-        raise ValueRefusedError(f"{instance}.lower", p.lower, "1", "not less than the gain", f"less than {p.gain}")
 
 
 MODEL = Model(
@@ -122,5 +116,5 @@ MODEL = Model(
         Task("walk", "slow", walk, normals=1),
     ),
     seed=lambda p: p.noise.seed,
-    rules=rules,
+    rules=(Rule("lower", "more than 100 % of the gain %s %d", lambda p: (-inf, p.gain)),),
 )

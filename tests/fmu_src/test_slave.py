@@ -106,16 +106,16 @@ REFUSED: dict[str, tuple[Callable[[Instance], Any], str]] = {
     "not a number": (lambda u: u.__setitem__("temperature", math.nan), r"EveryKind.temperature = nan K: not a finite"),
     "celsius": (
         lambda u: u.__setitem__("temperature", 25.0),
-        r"EveryKind.temperature = 25.0 K: .*kelvin.*200.0 to 400.0 K",
+        r"EveryKind.temperature = 25 K: .*kelvin.*200 to 400 K",
     ),
-    "too large": (lambda u: u.__setitem__("rate[1]", 101.0), r"EveryKind.rate\[1\] = 101.0 rad/s: too large"),
+    "too large": (lambda u: u.__setitem__("rate[1]", 101.0), r"EveryKind.rate\[1\] = 101 rad/s: too large"),
     "infinite": (lambda u: u.__setitem__("gain", math.inf), r"EveryKind.gain = inf"),
     "no such choice": (lambda u: u.__setitem__("choice", 3), r"EveryKind.choice = 3: no such choice .*1 a, 2 b"),
     "integer out of range": (lambda u: u.__setitem__("steps", -1), r"EveryKind.steps = -1: too small"),
     "fixed parameter": (
         lambda u: u.__setitem__("period", 2e-3),
         r"EveryKind.period = 0.002 s: fixed, can be set only before the end of initialisation "
-        r"\(allowed: 0.0001 to 1.0 s\)",
+        r"\(allowed: 0.0001 to 1 s\)",
     ),
     "output": (lambda u: u.__setitem__("shown.count", 3), r"shown.count cannot be set: its causality is output"),
     "wrong type": (lambda u: u.fmu.setReal([u.variables["steps"].valueReference], [1.0]), r"steps is of type Integer"),
@@ -189,7 +189,7 @@ def test_after_a_failed_step_only_reset_or_restore_help(unit: Instance, capfd: p
     unit.initialise().step(3)
     saved = unit.fmu.getFMUstate()
     _break(unit, 3e-3)
-    assert "100 % broken %s %d" in capfd.readouterr().err
+    assert "float division by zero" in capfd.readouterr().err
     assert unit["shown.count"] == 3
     for call in (lambda: unit.__setitem__("steps", 0), lambda: unit.step(start=3e-3)):
         with pytest.raises(FMICallException):

@@ -55,7 +55,7 @@ def test_unflatten_is_the_inverse_of_flatten() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"temperature": 25.0}, r"sensor.temperature = 25.0 K: too small, kelvin wanted \(allowed: 200.0 to 450.0 K\)"),
+        ({"temperature": 25.0}, r"sensor.temperature = 25 K: too small, kelvin wanted \(allowed: 200 to 450 K\)"),
         ({"temperature": float("nan")}, "sensor.temperature = nan K: not a finite number"),
         ({"way": 3}, r"sensor.way = 3: no such choice \(allowed: 1 left, 2 right\)"),
         ({"enabled": 2}, "sensor.enabled = 2: not a switch"),

@@ -19,7 +19,7 @@ from attitude_fmu.models.attitude.rotations import Euler, euler_from_matrix, mat
 from attitude_fmu.models.errors import ValueRefusedError
 from attitude_fmu.models.record import Boolean, Enumeration, Integer, Leaf, Real, defaults, flatten, leaves, unflatten
 from attitude_fmu.models.scalar import PI
-from attitude_fmu.models.system import Model, Run
+from attitude_fmu.models.system import Model, Run, check_rules
 
 MODELS = [import_module(entry.module).MODEL for entry in CATALOGUE]
 POINTS = 60
@@ -94,7 +94,7 @@ def legal_parameters(model: Model, chance: random.Random) -> list[float]:
     while True:
         parameters = points_near(model.Parameters, defaults(model.Parameters), chance)
         try:
-            model.rules(unflatten(model.Parameters, parameters), model.name)
+            check_rules(model, unflatten(model.Parameters, parameters), model.name)
         except ValueRefusedError:
             continue
         return parameters
