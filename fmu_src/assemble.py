@@ -1,12 +1,11 @@
 """One FMU put together, in a process of its own: pythonfmu's builder leaves traces in the process that calls it.
 
-``python -m attitude_fmu.fmu_src.assemble '<catalogue entry as JSON>' <file>`` writes the FMU.
+``python -m attitude_fmu.fmu_src.assemble '<order as JSON>' <file>`` writes the FMU.
 """
 
 from __future__ import annotations
 
 import importlib
-import json
 import sys
 import tempfile
 import zipfile
@@ -16,18 +15,17 @@ from pythonfmu import FmuBuilder  # type: ignore[import-untyped]
 
 from ..models.errors import AttitudeFmuError
 from ..models.system import Model
+from .build import Order
 from .catalogue import Entry
-from .description import model_description
-from .documentation import EXTERNAL_DEPENDENCIES, index_page
-from .sources import Sources, license_of, sources_of, version
+from .description import build_description, model_description
+from .documentation import external_dependencies, index_page
+from .native.c_code import model_source
+from .native.compile import PLATFORMS, compile_all
+from .sources import Sources, fingerprint_of, guid_of, license_of, sources_of, version
+from .trace import Trace, trace
 
-_ICONS = Path(__file__).parent
+_HERE = Path(__file__).parent
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-
-
-def _model(entry: Entry) -> Model:
-    model: Model = importlib.import_module(entry.module).MODEL
-    return model
 
 
 def _by_pythonfmu(sources: Sources, folder: Path) -> dict[str, bytes]:
@@ -43,17 +41,40 @@ def _by_pythonfmu(sources: Sources, folder: Path) -> dict[str, bytes]:
         return {name: built.read(name) for name in built.namelist() if "__pycache__" not in name}
 
 
-def _additions(entry: Entry, sources: Sources) -> dict[str, bytes]:
-    model, ours = _model(entry), license_of()
-    copyright_line = next((line for line in ours.splitlines() if line.startswith("Copyright")), None)
-    icon = _ICONS / entry.icon
+def _python_content(entry: Entry) -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory(prefix="attitude_fmu_") as folder:
+        content = _by_pythonfmu(sources_of(entry), Path(folder))
+    return {**content, "documentation/licenses/pythonfmu.txt": license_of("pythonfmu").encode()}
+
+
+def c_sources(traced: Trace, fingerprint: str) -> dict[str, bytes]:
+    """The C files of a model's FMU by name: the runtime, and model.c."""
+    files = {path.name: path.read_bytes() for path in sorted((_HERE / "native" / "runtime").glob("*.[ch]"))}
+    return {**files, "model.c": model_source(traced, guid_of(fingerprint), fingerprint).encode()}
+
+
+def _native_content(order: Order, traced: Trace, fingerprint: str) -> dict[str, bytes]:
+    identifier = order.entry.identifier
+    sources = c_sources(traced, fingerprint)
+    wanted = [platform for platform in PLATFORMS if platform.folder in order.platforms]
+    libraries = compile_all(sources, wanted)
     return {
-        "modelDescription.xml": model_description(model, entry, sources.guid, version(), copyright_line),
-        "model.png": icon.read_bytes(),
-        "documentation/index.html": index_page(model, entry, version()).encode(),
-        "documentation/externalDependencies.txt": EXTERNAL_DEPENDENCIES.encode(),
+        **{f"sources/{name}": content for name, content in sources.items()},
+        "sources/buildDescription.xml": build_description(order.entry),
+        **{f"binaries/{one.folder}/{identifier}{one.suffix}": libraries[one.folder] for one in wanted},
+    }
+
+
+def _common_content(order: Order, traced: Trace, fingerprint: str) -> dict[str, bytes]:
+    entry, kind, ours = order.entry, order.kind, license_of()
+    copyright_line = next((line for line in ours.splitlines() if line.startswith("Copyright")), None)
+    guid = guid_of(fingerprint)
+    return {
+        "modelDescription.xml": model_description(traced, entry, kind, guid, version(), copyright_line),
+        "model.png": (_HERE / entry.icon).read_bytes(),
+        "documentation/index.html": index_page(traced.model, entry, kind, version()).encode(),
+        "documentation/externalDependencies.txt": external_dependencies(kind).encode(),
         "documentation/licenses/license.txt": ours.encode(),
-        "documentation/licenses/pythonfmu.txt": license_of("pythonfmu").encode(),
     }
 
 
@@ -69,17 +90,18 @@ def pack(content: dict[str, bytes], archive: Path) -> None:
             fmu.writestr(item, content[name], compresslevel=9)
 
 
-def assemble(entry: Entry, archive: Path) -> None:
+def assemble(order: Order, archive: Path) -> None:
     """Make one FMU and write it to `archive`."""
-    sources = sources_of(entry)
-    additions = _additions(entry, sources)
-    with tempfile.TemporaryDirectory(prefix="attitude_fmu_") as folder:
-        content = _by_pythonfmu(sources, Path(folder))
-    pack({**content, **additions}, archive)
+    model: Model = importlib.import_module(order.entry.module).MODEL
+    fingerprint = fingerprint_of(order.entry, order.kind)
+    traced = trace(model)
+    common = _common_content(order, traced, fingerprint)
+    own = _python_content(order.entry) if order.kind == "python" else _native_content(order, traced, fingerprint)
+    pack({**own, **common}, archive)
 
 
 if __name__ == "__main__":
     try:
-        assemble(Entry(*json.loads(sys.argv[1])), Path(sys.argv[2]))
+        assemble(Order.from_json(sys.argv[1]), Path(sys.argv[2]))
     except AttitudeFmuError as error:
         sys.exit(str(error))

@@ -1,6 +1,7 @@
 """Builds the FMUs of the catalogue.
 
-``build_all(Path("dist"))`` makes what is missing or older than its sources; ``build`` makes one in any case.
+``build_all(Path("dist"))`` makes what is missing or older than its sources; ``build`` makes one in any case. Native
+FMUs lie in the folder itself, those of the Python kind in its folder ``python``, under the same names.
 """
 
 from __future__ import annotations
@@ -14,15 +15,38 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
-from .catalogue import CATALOGUE, Entry
+from .catalogue import CATALOGUE, Entry, Kind
 from .catalogue import entry as entry_called
 from .errors import BuildError
-from .sources import sources_of
+from .native.compile import PLATFORMS, host_platform
+from .sources import fingerprint_of, guid_of
+
+Platforms = Literal["host", "all"]
+"""The platforms that a native FMU is compiled for: this machine's own, or every one."""
 
 Progress = Callable[[str, str], None]
 """Called with an FMU's identifier and what happens: "building", "built" or "up to date"."""
+
+
+class Order(NamedTuple):
+    """What to assemble: the entry, the kind, and the folders of the platforms of a native FMU."""
+
+    entry: Entry
+    kind: Kind
+    platforms: tuple[str, ...]
+
+    def to_json(self) -> str:
+        """The order as text for another process."""
+        return json.dumps(self)
+
+    @classmethod
+    def from_json(cls, text: str) -> Order:
+        """The order that `to_json` wrote."""
+        entry, kind, platforms = json.loads(text)
+        return cls(Entry(*entry), kind, tuple(platforms))
 
 
 def _quiet(_identifier: str, _event: str) -> None:
@@ -31,6 +55,11 @@ def _quiet(_identifier: str, _event: str) -> None:
 
 def _entry(which: str | Entry) -> Entry:
     return entry_called(which) if isinstance(which, str) else which
+
+
+def folder_of(dist: Path, kind: Kind) -> Path:
+    """Where in `dist` the FMUs of a kind lie."""
+    return dist if kind == "native" else dist / "python"
 
 
 def _search_path() -> str:
@@ -42,10 +71,18 @@ def _search_path() -> str:
     return os.pathsep.join([*places, os.getcwd()] if "" in sys.path else places)
 
 
-def _assembled(entry: Entry, archive: Path) -> None:
+def _folders(kind: Kind, platforms: Platforms) -> tuple[str, ...]:
+    if kind == "python":
+        return ()
+    wanted = [host_platform()] if platforms == "host" else PLATFORMS
+    return tuple(platform.folder for platform in wanted)
+
+
+def _assembled(entry: Entry, kind: Kind, platforms: Platforms, archive: Path) -> None:
+    order = Order(entry, kind, _folders(kind, platforms))
     done = subprocess.run(
         # -P: with -m alone the current folder would be the first place to look
-        [sys.executable, "-P", "-m", f"{__package__}.assemble", json.dumps(entry), str(archive)],
+        [sys.executable, "-P", "-m", f"{__package__}.assemble", order.to_json(), str(archive)],
         env={**os.environ, "PYTHONPATH": _search_path(), "PYTHONDONTWRITEBYTECODE": "1"},
         capture_output=True,
         text=True,
@@ -55,16 +92,17 @@ def _assembled(entry: Entry, archive: Path) -> None:
         raise BuildError(f"{entry.identifier} could not be built:\n{(done.stderr or done.stdout).strip()}")
 
 
-def build(which: str | Entry, dist: Path) -> Path:
+def build(which: str | Entry, dist: Path, kind: Kind = "native", platforms: Platforms = "host") -> Path:
     """Build one FMU into the folder `dist`; a file of the same name is replaced whole or not at all."""
     entry = _entry(which)
-    target = dist / f"{entry.identifier}.fmu"
+    folder = folder_of(dist, kind)
+    target = folder / f"{entry.identifier}.fmu"
     try:
-        dist.mkdir(parents=True, exist_ok=True)
-        handle, unfinished = tempfile.mkstemp(prefix=f".{entry.identifier}_", suffix=".tmp", dir=dist)
+        folder.mkdir(parents=True, exist_ok=True)
+        handle, unfinished = tempfile.mkstemp(prefix=f".{entry.identifier}_", suffix=".tmp", dir=folder)
         os.close(handle)
         try:
-            _assembled(entry, Path(unfinished))
+            _assembled(entry, kind, platforms, Path(unfinished))
             Path(unfinished).chmod(0o644)
             os.replace(unfinished, target)
         finally:
@@ -75,29 +113,36 @@ def build(which: str | Entry, dist: Path) -> Path:
     return target
 
 
-def is_stale(which: str | Entry, dist: Path) -> bool:
-    """Whether the FMU in `dist` is missing, unreadable or not made from the sources as they are now."""
+def is_stale(which: str | Entry, dist: Path, kind: Kind = "native", platforms: Platforms = "host") -> bool:
+    """Whether the FMU in `dist` is missing, unreadable, not made from the sources as they are, or lacks a platform."""
     entry = _entry(which)
     try:
-        with zipfile.ZipFile(dist / f"{entry.identifier}.fmu") as fmu:
+        with zipfile.ZipFile(folder_of(dist, kind) / f"{entry.identifier}.fmu") as fmu:
             guid = ElementTree.fromstring(fmu.read("modelDescription.xml")).get("guid")
+            present = {name.split("/")[1] for name in fmu.namelist() if name.startswith("binaries/")}
     except (OSError, KeyError, zipfile.BadZipFile, ElementTree.ParseError):
         return True
-    return guid != sources_of(entry).guid
+    return guid != guid_of(fingerprint_of(entry, kind)) or not present.issuperset(_folders(kind, platforms))
 
 
 def build_all(
-    dist: Path, names: Sequence[str] | None = None, progress: Progress = _quiet, *, always: bool = False
+    dist: Path,
+    names: Sequence[str] | None = None,
+    progress: Progress = _quiet,
+    *,
+    kind: Kind = "native",
+    platforms: Platforms = "host",
+    always: bool = False,
 ) -> list[Path]:
     """Build the FMUs called `names` (all of the catalogue if None) where stale; the paths, in the order asked for."""
     entries = list(CATALOGUE) if names is None else [entry_called(name) for name in names]
     paths = []
     for entry in entries:
-        if always or is_stale(entry, dist):
+        if always or is_stale(entry, dist, kind, platforms):
             progress(entry.identifier, "building")
-            build(entry, dist)
+            build(entry, dist, kind, platforms)
             progress(entry.identifier, "built")
         else:
             progress(entry.identifier, "up to date")
-        paths.append(dist / f"{entry.identifier}.fmu")
+        paths.append(folder_of(dist, kind) / f"{entry.identifier}.fmu")
     return paths

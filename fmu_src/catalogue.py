@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from .errors import BuildError
+
+Kind = Literal["native", "python"]
+"""Compiled C, or Python sources run by pythonfmu; variables and value references are the same."""
+
+KINDS: tuple[Kind, ...] = ("native", "python")
 
 
 class Entry(NamedTuple):

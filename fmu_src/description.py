@@ -1,8 +1,7 @@
 """modelDescription.xml of a model, complete: units, types, ranges, causalities, structure.
 
 The outputs follow from the state alone, so none depends directly on an input (``dependencies=""``) and masters see
-no algebraic loop. At initialisation outputs and coefficients may depend on everything that is set (no
-``dependencies`` means that).
+no algebraic loop. What outputs and coefficients depend on at initialisation is read off the model's trace.
 """
 
 from __future__ import annotations
@@ -12,23 +11,33 @@ from typing import Any
 from lxml import etree  # type: ignore[import-untyped]
 
 from ..models.record import Boolean, Enumeration, Fact, Integer, Item, Real
-from ..models.system import Model
-from .catalogue import Entry
+from .catalogue import Entry, Kind
 from .errors import InterfaceError
 from .interface import Interface, Variable, interface_of
+from .trace import Trace
 from .units import BASE_UNITS, Quantity, completed, display_of, parse, quantity_of
 from .wording import descriptions
 
 GENERATED = "1980-01-01T00:00:00Z"
 """Date in the description and in the archive, always the same so that the same sources give the same bytes."""
 
-_LOG_CATEGORIES = (
-    ("logStatusWarning", "Something looks wrong, the simulation goes on."),
-    ("logStatusDiscard", "A step was not completed."),
-    ("logStatusError", "A call was refused."),
-    ("logStatusFatal", "A call was refused or a step failed; the text tells why."),
-    ("logAll", "All messages."),
-)
+_LOG_CATEGORIES: dict[Kind, tuple[tuple[str, str], ...]] = {
+    "native": (
+        ("logEvents", "Initialised, terminated, reset, state restored."),
+        ("logStatusError", "A call was refused or a step failed; the text tells why."),
+        ("logAll", "All messages."),
+    ),
+    "python": (
+        ("logStatusWarning", "Something looks wrong, the simulation goes on."),
+        ("logStatusDiscard", "A step was not completed."),
+        ("logStatusError", "A call was refused."),
+        ("logStatusFatal", "A call was refused or a step failed; the text tells why."),
+        ("logAll", "All messages."),
+    ),
+}
+
+SOURCE_FILE = "fmu.c"
+"""The one C file to compile."""
 
 
 def _text(value: Any) -> str:
@@ -155,39 +164,57 @@ def _variables(root: Any, variables: tuple[Variable, ...]) -> None:
         etree.SubElement(scalar, variable.kind, _type_attributes(variable))
 
 
-def _structure(root: Any, interface: Interface) -> None:
+def _structure(root: Any, interface: Interface, initial_dependencies: dict[int, tuple[int, ...]]) -> None:
     structure = etree.SubElement(root, "ModelStructure")
-    outputs = interface.variables[interface.outputs]
-    coefficients = interface.variables[interface.coefficients]
-    if outputs:
-        element = etree.SubElement(structure, "Outputs")
-        for variable in outputs:
+    element = etree.SubElement(structure, "Outputs")
+    for variable in interface.variables:
+        if variable.causality == "output":
             etree.SubElement(element, "Unknown", index=str(variable.value_reference + 1), dependencies="")
-    if outputs or coefficients:
-        element = etree.SubElement(structure, "InitialUnknowns")
-        for variable in (*outputs, *coefficients):
-            etree.SubElement(element, "Unknown", index=str(variable.value_reference + 1))
+    element = etree.SubElement(structure, "InitialUnknowns")
+    for variable in interface.variables:
+        if variable.causality in ("output", "calculatedParameter"):
+            reference = variable.value_reference
+            known = " ".join(str(place + 1) for place in initial_dependencies.get(reference, ()))
+            etree.SubElement(element, "Unknown", index=str(reference + 1), dependencies=known)
 
 
-def _co_simulation(root: Any, entry: Entry) -> None:
-    etree.SubElement(
+def _co_simulation(root: Any, entry: Entry, kind: Kind) -> None:
+    is_native = kind == "native"
+    element = etree.SubElement(
         root,
         "CoSimulation",
         _attributes(
             modelIdentifier=entry.identifier,
             needsExecutionTool=False,
             canHandleVariableCommunicationStepSize=True,
-            canInterpolateInputs=False,
+            canInterpolateInputs=is_native,
             canBeInstantiatedOnlyOncePerProcess=False,
             canNotUseMemoryManagementFunctions=True,
             canGetAndSetFMUstate=True,
             canSerializeFMUstate=True,
+            providesDirectionalDerivative=is_native,
         ),
     )
+    if is_native:
+        files = etree.SubElement(element, "SourceFiles")
+        etree.SubElement(files, "File", name=SOURCE_FILE)
 
 
-def model_description(model: Model, entry: Entry, guid: str, version: str, copyright_line: str | None) -> bytes:
+def build_description(entry: Entry) -> bytes:
+    """sources/buildDescription.xml as bytes: how to compile the C sources (in the form of FMI 3.0, as 2.0.4 has it)."""
+    root = etree.Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = etree.SubElement(root, "BuildConfiguration", modelIdentifier=entry.identifier)
+    files = etree.SubElement(configuration, "SourceFileSet", language="C99")
+    etree.SubElement(files, "SourceFile", name=SOURCE_FILE)
+    xml: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
+    return xml
+
+
+def model_description(
+    trace: Trace, entry: Entry, kind: Kind, guid: str, version: str, copyright_line: str | None
+) -> bytes:
     """modelDescription.xml as bytes."""
+    model = trace.model
     interface = interface_of(model)
     root = etree.Element(
         "fmiModelDescription",
@@ -205,11 +232,11 @@ def model_description(model: Model, entry: Entry, guid: str, version: str, copyr
             variableNamingConvention="structured",
         ),
     )
-    _co_simulation(root, entry)
+    _co_simulation(root, entry, kind)
     _unit_definitions(root, interface.variables)
     _type_definitions(root, interface.variables)
     categories = etree.SubElement(root, "LogCategories")
-    for name, text in _LOG_CATEGORIES:
+    for name, text in _LOG_CATEGORIES[kind]:
         etree.SubElement(categories, "Category", name=name, description=text)
     etree.SubElement(
         root,
@@ -217,6 +244,6 @@ def model_description(model: Model, entry: Entry, guid: str, version: str, copyr
         _attributes(startTime=0.0, stopTime=float(entry.stop_time), stepSize=float(entry.step_size)),
     )
     _variables(root, interface.variables)
-    _structure(root, interface)
+    _structure(root, interface, trace.initial_dependencies)
     xml: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     return xml

@@ -6,12 +6,20 @@ import html
 
 from ..models.record import Boolean, Enumeration, Real, allowed
 from ..models.system import Model
-from .catalogue import Entry
+from .catalogue import Entry, Kind
 from .interface import Variable, interface_of
 from .units import completed
 from .wording import descriptions
 
-EXTERNAL_DEPENDENCIES = """\
+_EXTERNAL_DEPENDENCIES: dict[Kind, str] = {
+    "native": """\
+This FMU is compiled C and needs nothing from the machine that runs it but the C library: on Linux glibc 2.17 or later,
+on Windows the Universal C Runtime (part of Windows 10 and later), on macOS version 11 or later.
+
+The C sources lie in sources/ (fmu.c is the one to compile, with the headers of FMI 2.0): a platform that is not in
+binaries/ is one compilation away, for instance with "fmpy compile".
+""",
+    "python": """\
 This FMU runs Python. It carries its own sources and pythonfmu 0.7; it needs from the machine that runs it
 
 - CPython 3.11 or later, 64 bit (Windows or Linux on x86-64), nothing installed into it;
@@ -21,7 +29,14 @@ This FMU runs Python. It carries its own sources and pythonfmu 0.7; it needs fro
 
 Unpack it under a path of plain characters (letters, digits, "_", "-", "~", blanks): pythonfmu's binary crashes on a
 resource location with other characters ("%.." escapes, as for umlauts), and on one written "file:/" without "//".
-"""
+""",
+}
+
+
+def external_dependencies(kind: Kind) -> str:
+    """documentation/externalDependencies.txt."""
+    return _EXTERNAL_DEPENDENCIES[kind]
+
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 75rem; padding: 0 1rem; color: #1d2733; }
@@ -30,17 +45,31 @@ th, td { text-align: left; vertical-align: top; padding: .25rem .6rem; border-bo
 th { background: #eef2f6; } td:first-child { font-family: ui-monospace, monospace; white-space: nowrap; }
 """
 
+_REFUSAL: dict[Kind, str] = {
+    "native": "fmi2Error, nothing of it is stored, and its reason is written to the log",
+    "python": "fmi2Fatal (pythonfmu 0.7 has no other way), nothing of it is stored, and its reason is written to the "
+    "log (with logging on) and to stderr",
+}
+
 _ERRORS = """\
 A value out of its range, a fixed parameter set after initialisation, a call at the wrong time, a step from a wrong
-communication point: the call returns fmi2Fatal (pythonfmu 0.7 has no other way), nothing of it is stored, and its
-reason is written to the log (with logging on) and to stderr, for a value as
+communication point: the call returns {refusal}, for a value as
 <code>instance.variable = value unit: why (allowed range)</code>. The instance is whole: it can be set rightly, reset
-or freed.</p>
+or freed. The output <code>refused_calls</code> counts such calls, for masters that do not look at what a call
+returns.</p>
 <p>Values that are each in their range but do not go together can only be judged once all are set. They are stored;
 fmi2ExitInitializationMode, the next step or the next reading of a calculated value refuses them in the same way, again
 and again until they agree.</p>
 <p>When the model itself fails in a step, the instance stops: values can be read, further steps and settings are
 refused until it is reset or a saved state is restored."""
+
+_SOURCES: dict[Kind, str] = {
+    "native": """\
+The C sources lie in <code>sources/</code>; they are written from the same Python source that the Python kind of this
+FMU runs, and give the same bits. Real inputs may be given with their first derivatives (fmi2SetRealInputDerivatives):
+they then follow a slope within the next step. Directional derivatives are exact.""",
+    "python": "The Python sources lie in <code>resources/</code>.",
+}
 
 _CONVENTIONS = """\
 Units are SI, temperatures in K; a unit in brackets is for showing. Body axes b are right, forward, up (elements 1, 2, 3
@@ -110,18 +139,21 @@ def _section(title: str, described: list[tuple[Variable, str]], prefix: str | No
     return f"<h2>{title}</h2>\n{''.join(tables)}"
 
 
-def index_page(model: Model, entry: Entry, version: str) -> str:
+def index_page(model: Model, entry: Entry, kind: Kind, version: str) -> str:
     """documentation/index.html: conventions, errors, and every variable with unit, range and meaning."""
     interface = interface_of(model)
     described = list(zip(interface.variables, descriptions(interface.variables), strict=True))
     sections = (
-        ("Inputs", interface.inputs, None),
-        ("Outputs", interface.outputs, None),
-        ("Parameters", interface.parameters, ""),
-        ("Calculated parameters", interface.coefficients, "coefficient."),
-        ("State", interface.state, "state."),
+        ("Inputs", "input", None),
+        ("Outputs", "output", None),
+        ("Parameters", "parameter", ""),
+        ("Calculated parameters", "calculatedParameter", "coefficient."),
+        ("State", "local", "state."),
     )
-    tables = "".join(_section(heading, described[place], prefix) for heading, place, prefix in sections)
+    tables = "".join(
+        _section(heading, [pair for pair in described if pair[0].causality == causality], prefix)
+        for heading, causality, prefix in sections
+    )
     title = html.escape(model.name)
     return f"""<!DOCTYPE html>
 <html lang="en">
@@ -134,9 +166,9 @@ def index_page(model: Model, entry: Entry, version: str) -> str:
 <p>{html.escape(_CONVENTIONS)}</p>
 <h2>Use</h2>
 <p>FMI 2.0 for co-simulation, attitude-fmu {html.escape(version)}. Communication steps of any length give the same
-results at common times for the same inputs. The Python sources lie in <code>resources/</code>.</p>
+results at common times for the same inputs. {_SOURCES[kind]}</p>
 <h2>Errors</h2>
-<p>{_ERRORS}</p>
+<p>{_ERRORS.format(refusal=_REFUSAL[kind])}</p>
 {tables}</body>
 </html>
 """

@@ -64,6 +64,8 @@ def guarded(method: _Method) -> _Method:
             return method(self, *arguments)
         except BaseException as error:  # also KeyboardInterrupt: the wrapper mishandles every one
             message = _message(self, error)
+            with contextlib.suppress(Exception):  # what broke may be the instance itself
+                self.count_refusal()
             _show(message, error)
             _hold(self)
             raise FailedCall(message) from None

@@ -8,6 +8,7 @@ record                  FMI name               causality, variability
 ``Outputs``             as in the record       output; continuous if real, otherwise discrete
 ``Coefficients``        ``coefficient.`` + it  calculatedParameter; tunable if any parameter is
 ``State``               ``state.`` + it        local; discrete, for it moves at the ticks of clocks
+none                    ``refused_calls``      output; for masters that do not look at the status of their calls
 ======================  =====================  ==================================================
 
 A variable's value reference is its place in this order, from 0.
@@ -18,7 +19,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any, NamedTuple
 
-from ..models.record import Fact, Leaf, Real, leaves, refusal
+from ..models.record import Fact, Integer, Leaf, Real, leaves, refusal
 from ..models.system import Model
 from .errors import InterfaceError
 
@@ -49,6 +50,12 @@ class Interface(NamedTuple):
     outputs: slice
     coefficients: slice
     state: slice
+    refused: int
+
+
+_REFUSED = Leaf(
+    "refused_calls", Integer("calls that were refused since the instance was made; the log tells why", min=0), None
+)
 
 
 def _continuous(fact: Fact) -> str:
@@ -108,12 +115,13 @@ def _interface(parameters: type, inputs: type, outputs: type, coefficients: type
         builder.inner(coefficients, "coefficient.", "calculatedParameter", "tunable" if tunable else "fixed"),
         builder.inner(state, "state.", "local", "discrete"),
     )
+    builder.add(_REFUSED, "", "output", "discrete", "calculated")
     seen: set[str] = set()
     for variable in builder.variables:
         if variable.name in seen:
             raise InterfaceError(f"two records have a variable {variable.name}")
         seen.add(variable.name)
-    return Interface(tuple(builder.variables), *slices)
+    return Interface(tuple(builder.variables), *slices, len(builder.variables) - 1)
 
 
 def interface_of(model: Model) -> Interface:

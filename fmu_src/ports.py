@@ -45,7 +45,8 @@ class Writing(NamedTuple):
     inputs_only: bool
 
 
-def _limits(variable: Variable) -> tuple[float, float]:
+def limits_of(variable: Variable) -> tuple[float, float]:
+    """The smallest and the largest value that a variable takes."""
     fact = variable.fact
     if isinstance(fact, Boolean):
         return 0.0, 1.0
@@ -91,7 +92,7 @@ class Ports:
         return found
 
     def _group(self, reference: int) -> int:
-        if reference < self.interface.inputs.stop:
+        if reference < self.interface.inputs.stop or reference == self.interface.refused:
             return 0
         if reference < self.interface.outputs.stop:
             return OUTPUTS
@@ -115,7 +116,7 @@ class Ports:
         for variable in variables:
             if variable.causality not in ("parameter", "input"):
                 raise CallRefusedError(f"{variable.name} cannot be set: its causality is {variable.causality}")
-        limits = [_limits(variable) for variable in variables]
+        limits = [limits_of(variable) for variable in variables]
         plans = self.writings[kinds]
         if len(plans) >= _PLAN_LIMIT:
             plans.clear()

@@ -18,6 +18,18 @@ _CHECKSUM = struct.Struct("<I")
 INSTANTIATED, INITIALISING, STEPPING, STOPPED, TERMINATED = range(5)
 """The stages of an instance's life, in their order."""
 
+STAGES = (
+    "the instance is not initialised yet",
+    "the instance is being initialised, which fmi2ExitInitializationMode ends",
+    "the instance is initialised already; fmi2Reset makes it begin anew",
+    "stopped by an error before; fmi2Reset or fmi2SetFMUstate makes it go on",
+    "terminated; fmi2Reset or fmi2SetFMUstate makes it go on",
+)
+"""Why a call is refused in each stage."""
+
+TIME_SLACK = 1e-6
+"""Part of a step by which a host's communication point may miss the end of the step before: hosts add up."""
+
 
 class SavedState(NamedTuple):
     """Everything that decides how an instance goes on; no reference to the instance itself."""

@@ -15,15 +15,14 @@ step and only when asked for.
 
 from __future__ import annotations
 
-import math
 import sys
 from typing import Any, ClassVar, NoReturn
 
 from pythonfmu import Fmi2Slave  # type: ignore[import-untyped]
 
-from ..models.errors import ValueRefusedError
+from ..models.errors import ValueRefusedError, digits
 from ..models.record import Leaf, allowed, flatten, refusal, unflatten
-from ..models.system import Model, Run, Snapshot
+from ..models.system import LATEST_TIME, Model, Run, Snapshot
 from .errors import CallRefusedError, InterfaceError
 from .failure import guarded
 from .interface import interface_of
@@ -31,25 +30,16 @@ from .ports import BOOLEAN, COEFFICIENTS, EVERYTHING, INTEGER, OUTPUTS, REAL, ST
 from .saved_state import (
     INITIALISING,
     INSTANTIATED,
+    STAGES,
     STEPPING,
     STOPPED,
     TERMINATED,
+    TIME_SLACK,
     DamagedState,
     SavedState,
     from_bytes,
     to_bytes,
 )
-
-TIME_SLACK = 1e-6
-"""Part of a step by which a host's communication point may miss the end of the step before: hosts add up."""
-
-_STAGES = {
-    INSTANTIATED: "the instance is not initialised yet",
-    INITIALISING: "the instance is being initialised, which fmi2ExitInitializationMode ends",
-    STEPPING: "the instance is initialised already; fmi2Reset makes it begin anew",
-    STOPPED: "stopped by an error before; fmi2Reset or fmi2SetFMUstate makes it go on",
-    TERMINATED: "terminated; fmi2Reset or fmi2SetFMUstate makes it go on",
-}
 
 
 class ModelSlave(Fmi2Slave):  # type: ignore[misc]
@@ -83,15 +73,19 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     # the life of an instance
 
+    def count_refusal(self) -> None:
+        """One more call was refused (`failure`)."""
+        self._values[self._ports.interface.refused] += 1
+
     def _refuse_call(self, call: str) -> NoReturn:
-        raise CallRefusedError(f"{call} refused: {_STAGES[self._stage]}")
+        raise CallRefusedError(f"{call} refused: {STAGES[self._stage]}")
 
     @guarded
     def setup_experiment(self, start_time: float, *_stop_time_and_tolerance: float | None) -> None:
         if self._stage != INSTANTIATED:
             self._refuse_call("fmi2SetupExperiment")
-        if not math.isfinite(start_time):
-            raise CallRefusedError(f"the start time is {start_time}")
+        if not abs(start_time) <= LATEST_TIME:
+            raise CallRefusedError(f"the start time is {digits(start_time)} s (allowed: up to {digits(LATEST_TIME)} s)")
         self._start_time = self._time = start_time
         self._run = None
 
@@ -129,10 +123,15 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     def _check_step(self, current_time: float, step_size: float) -> None:
         if self._stage != STEPPING:
             self._refuse_call("fmi2DoStep")
-        if not 0.0 <= step_size < math.inf:
-            raise CallRefusedError(f"a step of {step_size} s")
+        if not (step_size >= 0.0 and current_time + step_size <= LATEST_TIME):
+            raise CallRefusedError(
+                f"a step of {digits(step_size)} s from t = {digits(current_time)} s "
+                f"(allowed: forwards, up to {digits(LATEST_TIME)} s)"
+            )
         if not abs(current_time - self._time) <= TIME_SLACK * step_size + 1e-9:
-            raise CallRefusedError(f"a step from t = {current_time} s, but the FMU stands at t = {self._time} s")
+            raise CallRefusedError(
+                f"a step from t = {digits(current_time)} s, but the FMU stands at t = {digits(self._time)} s"
+            )
 
     def _parameters(self, values: list[Any]) -> Any:
         return unflatten(self.model.Parameters, values[self._ports.interface.parameters])
@@ -194,7 +193,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                     allowed(variable.fact),
                 )
         self._parameters_changed = True
-        self._stale = EVERYTHING
+        self._stale |= OUTPUTS | COEFFICIENTS
 
     def _refuse(self, plan: Writing, values: list[Any]) -> None:
         for variable, value in zip(plan.variables, values, strict=True):

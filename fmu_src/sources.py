@@ -1,8 +1,8 @@
-"""Which Python sources go into an FMU, under which names, and the fingerprint of everything that it is made of.
+"""The fingerprint of everything that an FMU is made of; and which Python sources go into one, under which names.
 
-In the FMU the sources lie in a package named after the FMU and its fingerprint, because all FMUs of a process share
-``sys.modules``: another FMU, or another version of this one, must not be taken for it. Only what the model imports
-goes in.
+In an FMU of the Python kind the sources lie in a package named after the FMU and its fingerprint, because all FMUs of
+a process share ``sys.modules``: another FMU, or another version of this one, must not be taken for it. Only what the
+model imports goes in.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import pythonfmu  # type: ignore[import-untyped]
 
-from .catalogue import Entry
+from .catalogue import Entry, Kind
 from .errors import BuildError
 
 _PACKAGE = "attitude_fmu"
@@ -29,18 +29,12 @@ _HERE = Path(__file__).parent
 
 
 class Sources(NamedTuple):
-    """The sources of one FMU: package name in the FMU, name of its slave module, files by path, fingerprint."""
+    """The Python sources of one FMU: package name in the FMU, name of its slave module, files by path, fingerprint."""
 
     package: str
     slave_module: str
     files: dict[str, bytes]
     fingerprint: str
-
-    @property
-    def guid(self) -> str:
-        """The fingerprint as FMI GUID."""
-        f = self.fingerprint
-        return f"{{{f[:8]}-{f[8:12]}-{f[12:16]}-{f[16:20]}-{f[20:32]}}}"
 
 
 def _spec(name: str) -> ModuleSpec | None:
@@ -85,20 +79,37 @@ def _path_in_package(name: str, origin: Path) -> str:
     return f"{path}/__init__.py" if origin.name == "__init__.py" else f"{path}.py"
 
 
-def _build_files() -> Iterator[tuple[str, Path]]:
+def _files_below(folder: Path, name: str) -> Iterator[tuple[str, Path]]:
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            yield f"{name}/{path.relative_to(folder).as_posix()}", path
+
+
+def _build_files(kind: Kind) -> Iterator[tuple[str, Path]]:
     """What an FMU is made with, besides the model."""
     for path in sorted(_HERE.iterdir()):
         if path.suffix in (".py", ".png"):
             yield f"fmu_src/{path.name}", path
-    wrapper = Path(pythonfmu.__file__).parent
-    for path in sorted(wrapper.rglob("*")):
-        if path.is_file() and "__pycache__" not in path.parts:
-            yield f"pythonfmu/{path.relative_to(wrapper).as_posix()}", path
+    if kind == "python":
+        yield from _files_below(Path(pythonfmu.__file__).parent, "pythonfmu")
+    else:
+        yield from _files_below(_HERE / "native", "fmu_src/native")
+
+
+_TOOLS: dict[Kind, tuple[str, ...]] = {"python": ("casadi",), "native": ("casadi", "fmpy", "ziglang")}
+"""Packages whose version decides on an FMU's bytes."""
+
+
+def _version_of(distribution: str) -> str:
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        raise BuildError(f"the package {distribution}, which FMUs are built with, is not installed") from None
 
 
 def version() -> str:
     """Version of this package."""
-    return importlib.metadata.version(_DISTRIBUTION)
+    return _version_of(_DISTRIBUTION)
 
 
 def license_of(distribution: str = _DISTRIBUTION) -> str:
@@ -114,13 +125,27 @@ def license_of(distribution: str = _DISTRIBUTION) -> str:
     raise BuildError(f"the installed package {distribution} has no licence text")
 
 
-def _fingerprint(entry: Entry, model_files: dict[str, Path]) -> str:
-    digest = hashlib.sha256(repr((tuple(entry), version(), license_of())).encode())
-    for name, path in [*sorted(model_files.items()), *_build_files()]:
+def _model_files(entry: Entry) -> dict[str, Path]:
+    if _spec(entry.module) is None:
+        raise BuildError(f"{entry.identifier}: there is no module {entry.module}")
+    return _closure([_SLAVE, entry.module])
+
+
+def fingerprint_of(entry: Entry, kind: Kind) -> str:
+    """Hash of everything that an FMU is made of, as it is on disk now."""
+    tools = [_version_of(tool) for tool in _TOOLS[kind]]
+    digest = hashlib.sha256(repr((kind, tuple(entry), version(), license_of(), tools)).encode())
+    for name, path in [*sorted(_model_files(entry).items()), *_build_files(kind)]:
         content = path.read_bytes()
         digest.update(f"{name}\0{len(content)}\0".encode())
         digest.update(content)
     return digest.hexdigest()
+
+
+def guid_of(fingerprint: str) -> str:
+    """The fingerprint as FMI GUID."""
+    f = fingerprint
+    return f"{{{f[:8]}-{f[8:12]}-{f[12:16]}-{f[16:20]}-{f[20:32]}}}"
 
 
 def _slave_file(entry: Entry, package: str, fingerprint: str) -> str:
@@ -141,17 +166,14 @@ class {entry.identifier}(ModelSlave):
 
 
 def sources_of(entry: Entry) -> Sources:
-    """The sources of one FMU as they are on disk now."""
-    if _spec(entry.module) is None:
-        raise BuildError(f"{entry.identifier}: there is no module {entry.module}")
-    modules = _closure([_SLAVE, entry.module])
-    fingerprint = _fingerprint(entry, modules)
+    """The Python sources of one FMU as they are on disk now."""
+    fingerprint = fingerprint_of(entry, "python")
     snake = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", entry.identifier).lower()
     package = f"{snake}_{fingerprint[:12]}"
     renamed = re.compile(rf"\b{_PACKAGE}(?=\.)".encode())
     files = {
         f"{package}/{_path_in_package(name, origin)}": renamed.sub(package.encode(), origin.read_bytes())
-        for name, origin in modules.items()
+        for name, origin in _model_files(entry).items()
     }
     files[f"{package}/__init__.py"] = f'"""Sources of {entry.identifier}, version {version()}."""\n'.encode()
     slave_module = f"{package}_slave"

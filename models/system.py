@@ -22,6 +22,9 @@ add up rounded steps."""
 SHORTEST_PERIOD = 1e-6
 """Shortest period of a clock, s; a shorter one is a slip that would keep a host busy for ever."""
 
+LATEST_TIME = 1e9
+"""Largest time that a run may reach, s: beyond it a double does not tell short periods apart."""
+
 STOPPED = 1e12
 """Period of a clock that stands still, s."""
 

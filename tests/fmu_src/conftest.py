@@ -13,7 +13,7 @@ from attitude_fmu.fmu_src.build import build
 @pytest.fixture(scope="session")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """EveryKind.fmu."""
-    return build(EVERY_KIND, tmp_path_factory.mktemp("dist"))
+    return build(EVERY_KIND, tmp_path_factory.mktemp("dist"), "python")
 
 
 @pytest.fixture

@@ -1,0 +1,73 @@
+/* Saved states: a moment with a head that tells whose it is, and a checksum when it leaves as bytes.
+
+   Every field is 8 bytes long and little-endian, as all the platforms are that this is built for. */
+
+typedef struct {
+    uint64_t magic, fingerprint[2], size;
+    Moment moment;
+} SavedState;
+
+static const uint64_t MAGIC = 0x33554D46746E6F43u;
+
+/* CRC-32 of IEEE 802.3. */
+static uint32_t checksum_of(const unsigned char *bytes, size_t size)
+{
+    uint32_t crc = 0xFFFFFFFFu;
+    for (size_t i = 0; i < size; i++) {
+        crc ^= bytes[i];
+        for (int bit = 0; bit < 8; bit++)
+            crc = crc >> 1 ^ (0xEDB88320u & (0u - (crc & 1u)));
+    }
+    return ~crc;
+}
+
+static void save(const Instance *instance, SavedState *saved)
+{
+    saved->magic = MAGIC;
+    saved->fingerprint[0] = FINGERPRINT_0;
+    saved->fingerprint[1] = FINGERPRINT_1;
+    saved->size = sizeof *saved;
+    saved->moment = instance->now;
+}
+
+static int is_in_range(const Moment *moment)
+{
+    for (int i = 0; i < OUTPUTS_AT; i++)
+        if (!(SETTABLE[i].low <= moment->v[i] && moment->v[i] <= SETTABLE[i].high))
+            return 0;
+    for (int i = 0; i < CLOCKS; i++)
+        if (moment->ticks[i] < 0 || moment->ticks[i] > (int64_t)1 << 53)
+            return 0;
+    return are_finite(moment->v, VARIABLES) && are_finite(moment->slope, INPUTS) && INSTANTIATED <= moment->stage &&
+           moment->stage <= TERMINATED && fabs(moment->start_time) <= LATEST_TIME && fabs(moment->time) <= LATEST_TIME;
+}
+
+/* What the clocks and tasks of a moment are; calculates its coefficients anew. */
+static int find_schedule(Moment *moment, Schedule *found)
+{
+    coefficients(moment->v, NULL);
+    schedule(moment->v, (double *)found);
+    for (int i = 0; i < CLOCKS; i++)
+        if (!(found->period[i] >= SHORTEST_PERIOD))
+            return 0;
+    return 1;
+}
+
+/* Go on from a saved state; calls refused until now stay counted. NULL, or why not: then nothing has changed. */
+static const char *restore(Instance *instance, const SavedState *saved)
+{
+    Schedule found;
+    Moment moment;
+    if (!saved || saved->magic != MAGIC)
+        return "this is no saved state of this kind of FMU";
+    if (saved->fingerprint[0] != FINGERPRINT_0 || saved->fingerprint[1] != FINGERPRINT_1 || saved->size != sizeof *saved)
+        return "another FMU or version saved it";
+    moment = saved->moment;
+    if (!is_in_range(&moment) || (moment.stage >= STEPPING && !find_schedule(&moment, &found)))
+        return "it is damaged";
+    moment.v[REFUSED_AT] = instance->now.v[REFUSED_AT];
+    instance->now = moment;
+    if (moment.stage >= STEPPING)
+        plan(instance, &found, 1);
+    return NULL;
+}

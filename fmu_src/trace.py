@@ -1,0 +1,244 @@
+"""Models traced with CasADi: the same functions, called with symbols, as expressions that C code is written from.
+
+All numbers of an instance lie in one array, in which a variable's place is its value reference (`interface`). Every
+traced function reads and writes places of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import casadi
+
+from ..models.record import flatten, unflatten
+from ..models.system import Model, Task
+from .errors import BuildError
+from .interface import Interface, interface_of
+
+
+class Traced(NamedTuple):
+    """A function of ``arguments[0]`` (the instance's numbers) and ``arguments[1]`` (draws or tangents).
+
+    `results[i]` goes to place ``places[i]``.
+    """
+
+    name: str
+    purpose: str
+    arguments: tuple[Any, Any]
+    results: tuple[Any, ...]
+    places: tuple[int, ...]
+
+
+class Way(NamedTuple):
+    """One step of a task and the value of the choosing parameter that asks for it."""
+
+    value: int
+    step: Traced
+
+
+class TracedTask(NamedTuple):
+    """A task with all its ways."""
+
+    task: Task
+    ways: tuple[Way, ...]
+
+
+class Trace(NamedTuple):
+    """Everything of a model that becomes C; `tasks` are grouped by clock, in the clocks' order.
+
+    `initial_dependencies` are the settable variables that each output and coefficient follows from at initialisation.
+    """
+
+    model: Model
+    interface: Interface
+    coefficients: Traced
+    initial_state: Traced
+    outputs: Traced
+    schedule: Traced
+    limits: Traced
+    derivatives: tuple[Traced, ...]
+    tasks: tuple[TracedTask, ...]
+    initial_dependencies: dict[int, tuple[int, ...]]
+
+
+@contextmanager
+def _as_written() -> Iterator[None]:
+    """Keep expressions as the model writes them: simplified ones would differ from the floats in the last bits."""
+    casadi.GlobalOptions.setSimplificationOnTheFly(False)
+    try:
+        yield
+    finally:
+        casadi.GlobalOptions.setSimplificationOnTheFly(True)
+
+
+class _Symbols:
+    """The instance's numbers as symbols, and as the model's records."""
+
+    def __init__(self, model: Model, interface: Interface) -> None:
+        self.places = interface
+        self.v = casadi.SX.sym("v", len(interface.variables))
+        self.p = self._record(model.Parameters, interface.parameters)
+        self.u = self._record(model.Inputs, interface.inputs)
+        self.k = self._record(model.Coefficients, interface.coefficients)
+        self.x = self._record(model.State, interface.state)
+
+    def _record(self, record: type, place: slice) -> Any:
+        return unflatten(record, [self.v[i] for i in range(place.start, place.stop)])
+
+
+def _places(place: slice) -> tuple[int, ...]:
+    return tuple(range(place.start, place.stop))
+
+
+def _scalars(values: Any) -> tuple[Any, ...]:
+    return tuple(casadi.SX(value) for value in values)
+
+
+def _step(model: Model, symbols: _Symbols, name: str, task: Task, step: Callable[..., Any]) -> Traced:
+    """A task's step, of which only what changes is written back."""
+    z = casadi.SX.sym("z", task.normals)
+    draws = tuple(z[i] for i in range(task.normals))
+    after = flatten(step(symbols.x, symbols.u, symbols.p, symbols.k, draws))
+    moved = [
+        (place, casadi.SX(new))
+        for place, old, new in zip(_places(symbols.places.state), flatten(symbols.x), after, strict=True)
+        if new is not old
+    ]
+    return Traced(
+        name,
+        f"One step of the task {task.name}.",
+        (symbols.v, z),
+        tuple(new for _, new in moved),
+        tuple(place for place, _ in moved),
+    )
+
+
+def _task(model: Model, symbols: _Symbols, task: Task) -> TracedTask:
+    names = task.alternatives()
+    values = [0] if callable(task.step) else list(task.step)
+    steps = zip(values, names.items(), strict=True)
+    return TracedTask(
+        task, tuple(Way(value, _step(model, symbols, f"step_{name}", task, step)) for value, (name, step) in steps)
+    )
+
+
+def _schedule(model: Model, symbols: _Symbols, tasks: Sequence[Task]) -> Traced:
+    answers = [
+        model.seed(symbols.p),
+        *[clock.period(symbols.k) for clock in model.clocks],
+        *[task.every(symbols.k) for task in tasks],
+        *[0.0 if task.choice is None else task.choice(symbols.p) for task in tasks],
+    ]
+    return Traced(
+        "schedule",
+        "Seed, periods of the clocks, dividers and choices of the tasks.",
+        (symbols.v, casadi.SX(0, 1)),
+        _scalars(answers),
+        tuple(range(len(answers))),
+    )
+
+
+def _limits(model: Model, symbols: _Symbols) -> Traced:
+    bounds = [bound for rule in model.rules for bound in rule.limits(symbols.p)]
+    return Traced(
+        "limits",
+        "Limits of parameters that follow from other parameters: low and high of each rule.",
+        (symbols.v, casadi.SX(0, 1)),
+        _scalars(bounds),
+        tuple(range(len(bounds))),
+    )
+
+
+def _derivative(of: Traced, symbols: _Symbols) -> Traced:
+    """Tangents of the results, from the tangents of all that they follow from."""
+    tangent = casadi.SX.sym("d", symbols.v.numel())
+    direction = casadi.jtimes(casadi.vertcat(*of.results), symbols.v, tangent)
+    return Traced(
+        f"{of.name}_derivative",
+        f"Directional derivative of {of.name}.",
+        (symbols.v, tangent),
+        tuple(direction[i] for i in range(direction.numel())),
+        of.places,
+    )
+
+
+def _initial(traced: Sequence[Traced], symbols: _Symbols) -> Any:
+    """All numbers after the given functions have run one after the other."""
+    values = casadi.SX(symbols.v)
+    for function in traced:
+        results = casadi.substitute(casadi.vertcat(*function.results), symbols.v, values)
+        values = casadi.SX(values)
+        for i, place in enumerate(function.places):
+            values[place] = results[i]
+    return values
+
+
+def _dependencies(traced: Sequence[Traced], symbols: _Symbols) -> dict[int, tuple[int, ...]]:
+    values = _initial(traced, symbols)
+    pattern = casadi.jacobian_sparsity(values, symbols.v)
+    rows, columns = pattern.get_triplet()
+    settable = symbols.places.inputs.stop
+    found: dict[int, list[int]] = {
+        place: [] for group in (symbols.places.outputs, symbols.places.coefficients) for place in _places(group)
+    }
+    for row, column in zip(rows, columns, strict=True):
+        if row in found and column < settable:
+            found[row].append(column)
+    return {place: tuple(sorted(columns)) for place, columns in found.items()}
+
+
+def _check_clocks(
+    model: Model, interface: Interface, coefficients: Traced, schedule: Traced, symbols: _Symbols
+) -> None:
+    """Clocks are set at initialisation: what may be tuned later must not move them."""
+    values = _initial([coefficients], symbols)
+    periods = casadi.substitute(casadi.vertcat(*schedule.results[1 : 1 + len(model.clocks)]), symbols.v, values)
+    for variable in interface.variables[interface.parameters]:
+        if variable.variability == "tunable" and casadi.depends_on(periods, symbols.v[variable.value_reference]):
+            raise BuildError(
+                f"{model.name}: a clock's period depends on {variable.name}, which must then not be tunable"
+            )
+
+
+def trace(model: Model) -> Trace:
+    """Call every function of ``model`` with symbols.
+
+    Raises `BuildError` if a tunable parameter moves a clock.
+    """
+    interface = interface_of(model)
+    symbols = _Symbols(model, interface)
+    v, p, u, k, x = symbols.v, symbols.p, symbols.u, symbols.k, symbols.x
+    none = casadi.SX(0, 1)
+    order = [clock.name for clock in model.clocks]
+    tasks = sorted(model.tasks, key=lambda task: order.index(task.clock))
+
+    def traced(name: str, purpose: str, values: Any, place: slice) -> Traced:
+        return Traced(name, purpose, (v, none), _scalars(flatten(values)), _places(place))
+
+    with _as_written():
+        coefficients = traced(
+            "coefficients", "What follows from the parameters.", model.coefficients(p), interface.coefficients
+        )
+        initial_state = traced(
+            "initial_state", "The state at the start time.", model.initial_state(p, k, u), interface.state
+        )
+        outputs = traced("outputs", "What the model shows.", model.outputs(x, p, k), interface.outputs)
+        schedule = _schedule(model, symbols, tasks)
+        limits = _limits(model, symbols)
+        steps = tuple(_task(model, symbols, task) for task in tasks)
+    derivatives = tuple(_derivative(function, symbols) for function in (coefficients, initial_state, outputs))
+    _check_clocks(model, interface, coefficients, schedule, symbols)
+    return Trace(
+        model,
+        interface,
+        coefficients,
+        initial_state,
+        outputs,
+        schedule,
+        limits,
+        derivatives,
+        steps,
+        _dependencies((coefficients, initial_state, outputs), symbols),
+    )
