@@ -14,7 +14,8 @@ import re
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from ctypes import memmove
+from ctypes import c_size_t, c_void_p, memmove
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -180,11 +181,23 @@ def _matching(patterns: Sequence[str], interfaces: Mapping[str, Interface]) -> s
 
 
 class _Copy(NamedTuple):
-    """One block of a row: where it goes in the row, where it comes from, how long it is (bytes)."""
+    """One block of a row: where it goes in the row (bytes), the address to set to it, and the copying."""
 
     offset: int
-    source: int
-    size: int
+    target: c_void_p
+    make: Callable[[], object]
+
+
+_Gather = Callable[[], np.ndarray[Any, Any]]
+
+
+def _as_truths(gather: _Gather, buffer: np.ndarray[Any, Any]) -> _Gather:
+    """Gather whole numbers as 0 and 1."""
+
+    def gather_truths() -> np.ndarray[Any, Any]:
+        return np.not_equal(gather(), 0, out=buffer, casting="unsafe")
+
+    return gather_truths
 
 
 class _Coupled:
@@ -249,7 +262,9 @@ class _Coupled:
                 continue
             array = self.reals if kind == "Real" else self.wholes
             offset = offsets[f"{slave.name}.{recorded[0].name}"][1]
-            self.copies.append(_Copy(offset, array[first:].ctypes.data, len(recorded) * array.itemsize))
+            target, source = c_void_p(), array[first:].ctypes.data_as(c_void_p)
+            size = c_size_t(len(recorded) * array.itemsize)
+            self.copies.append(_Copy(offset, target, partial(memmove, target, source, size)))
 
     def _feed(self, slave: Slave, pools: Mapping[str, list[Port]], interfaces: Mapping[str, Interface]) -> None:
         wires = {c.target.variable: c.source for c in self.system.connections if c.target.component == slave.name}
@@ -267,7 +282,8 @@ class _Coupled:
                 interfaces[wires[v.name].component].variables[wires[v.name].variable].type == "Boolean"
                 for v in variables
             )
-            slave.feeds.append(Feed(pool, index, buffer, kind == "Boolean" and not from_truths, call))
+            gather = partial(pool.take, index, None, buffer, "clip")
+            slave.feeds.append(Feed(gather if kind != "Boolean" or from_truths else _as_truths(gather, buffer), call))
 
     def run(self, span: Span, order: Order, recording: Recording, watch: Watch) -> float:
         """Initialise, take all steps, record; gives the wall-clock time of the steps (s)."""
@@ -339,8 +355,9 @@ class _Coupled:
     def _record(self, recording: Recording, time: float) -> None:
         place = recording.length
         row = recording.address + place * self.dtype.itemsize
-        for offset, source, size in self.copies:
-            memmove(row + offset, source, size)
+        for offset, target, make in self.copies:
+            target.value = row + offset
+            make()
         for name, index in self.truths:
             recording.column(name)[place] = self.wholes[index]
         # last, because a row counts once it has its time

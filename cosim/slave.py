@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from ctypes import byref, c_double, c_int, c_size_t, c_uint32, c_void_p
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -42,22 +43,16 @@ _LOGGER = fmi2.fmi2CallbackLoggerTYPE(_heard)
 
 
 class Call(NamedTuple):
-    """One get or set call, ready to be made: the C function, its references, how many, and where the values lie."""
+    """One call of an FMU, ready to be made: its arguments are made once, which is most of what ctypes costs."""
 
     name: str
-    function: Callable[..., int]
-    references: Any
-    length: int
-    values: int
+    make: Callable[[], int]
 
 
 class Feed(NamedTuple):
-    """How one type of an FMU's inputs is filled: gather `places` of `pool` into `buffer`, then call."""
+    """How one type of an FMU's inputs is filled: gather the values, then call."""
 
-    pool: np.ndarray[Any, np.dtype[Any]]
-    places: np.ndarray[Any, np.dtype[np.intp]]
-    buffer: np.ndarray[Any, np.dtype[Any]]
-    truths: bool
+    gather: Callable[[], np.ndarray[Any, Any]]
     call: Call
 
 
@@ -88,7 +83,8 @@ class Slave:
                 f"{self.name} ({component.fmu.name}) cannot be loaded: {self._why(error)}"
             ) from error
         self.pointer = c_void_p(self.fmu.component)
-        self.do_step = self._function("fmi2DoStep", [c_void_p, c_double, c_double, c_int])
+        self._time, self._size = c_double(), c_double()
+        self._do_step = partial(self._function("fmi2DoStep"), self.pointer, self._time, self._size, c_int(1))
 
     def _instance(self, folder: Path) -> Any:
         # fmpy.instantiate_fmu would name every instance after its model
@@ -117,17 +113,17 @@ class Slave:
         said = self.said(_ERROR)
         return f"{error}{': ' + said if said else ''}"
 
-    def _function(self, name: str, arguments: list[Any]) -> Callable[..., int]:
+    def _function(self, name: str) -> Callable[..., int]:
         # by index: FMPy holds the attribute of this name with its own argument types
         function = self.fmu.dll[name]
-        function.argtypes, function.restype = arguments, c_int
+        function.restype = c_int
         return function  # type: ignore[no-any-return]
 
     def call(self, name: str, variables: Sequence[Variable], values: np.ndarray[Any, np.dtype[Any]]) -> Call:
         """A get or set call for these variables, with `values` as its memory."""
         references = (c_uint32 * len(variables))(*[variable.reference for variable in variables])
-        function = self._function(name, [c_void_p, c_void_p, c_size_t, c_void_p])
-        return Call(name, function, references, len(variables), values.ctypes.data)
+        count, place = c_size_t(len(variables)), values.ctypes.data_as(c_void_p)
+        return Call(name, partial(self._function(name), self.pointer, references, count, place))
 
     def said(self, at_least: int) -> str:
         """The last few things that the FMU logged with a status of `at_least` or worse."""
@@ -154,22 +150,21 @@ class Slave:
             raise self.failed(error.function, error.status, time) from None
 
     def set_inputs(self, time: float) -> None:
-        for pool, places, buffer, truths, call in self.feeds:
-            pool.take(places, out=buffer, mode="clip")
-            if truths:
-                np.not_equal(buffer, 0, out=buffer, casting="unsafe")
-            status = call.function(self.pointer, call.references, call.length, call.values)
+        for gather, (name, make) in self.feeds:
+            gather()
+            status = make()
             if status > WARNING:
-                raise self.failed(call.name, status, time)
+                raise self.failed(name, status, time)
 
     def step(self, time: float, size: float) -> None:
-        status = self.do_step(self.pointer, time, size, 1)
+        self._time.value, self._size.value = time, size
+        status = self._do_step()
         if status > WARNING:
             raise self.failed("fmi2DoStep", status, time)
 
     def get_outputs(self, time: float) -> None:
-        for name, function, references, length, values in self.gets:
-            status = function(self.pointer, references, length, values)
+        for name, make in self.gets:
+            status = make()
             if status > WARNING:
                 raise self.failed(name, status, time)
 

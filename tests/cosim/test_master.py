@@ -144,7 +144,7 @@ def test_whole_number_reaches_a_switch_as_0_or_1(fmus: dict[str, Path], monkeypa
     close = Slave.close
 
     def look(slave: Slave) -> None:
-        sent.extend(int(feed.buffer[0]) for feed in slave.feeds)
+        sent.extend(int(feed.gather()[0]) for feed in slave.feeds)
         close(slave)
 
     monkeypatch.setattr(Slave, "close", look)
