@@ -17,7 +17,7 @@ from contextlib import closing
 from ctypes import c_size_t, c_void_p, memmove
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 
@@ -195,7 +195,8 @@ def _as_truths(gather: _Gather, buffer: np.ndarray[Any, Any]) -> _Gather:
     """Gather whole numbers as 0 and 1."""
 
     def gather_truths() -> np.ndarray[Any, Any]:
-        return np.not_equal(gather(), 0, out=buffer, casting="unsafe")
+        np.not_equal(gather(), 0, out=buffer, casting="unsafe")
+        return buffer
 
     return gather_truths
 
@@ -263,7 +264,7 @@ class _Coupled:
             array = self.reals if kind == "Real" else self.wholes
             offset = offsets[f"{slave.name}.{recorded[0].name}"][1]
             target, source = c_void_p(), array[first:].ctypes.data_as(c_void_p)
-            size = c_size_t(len(recorded) * array.itemsize)
+            size: Any = c_size_t(len(recorded) * array.itemsize)
             self.copies.append(_Copy(offset, target, partial(memmove, target, source, size)))
 
     def _feed(self, slave: Slave, pools: Mapping[str, list[Port]], interfaces: Mapping[str, Interface]) -> None:
@@ -282,7 +283,7 @@ class _Coupled:
                 interfaces[wires[v.name].component].variables[wires[v.name].variable].type == "Boolean"
                 for v in variables
             )
-            gather = partial(pool.take, index, None, buffer, "clip")
+            gather = cast(_Gather, partial(pool.take, index, None, buffer, "clip"))
             slave.feeds.append(Feed(gather if kind != "Boolean" or from_truths else _as_truths(gather, buffer), call))
 
     def run(self, span: Span, order: Order, recording: Recording, watch: Watch) -> float:
