@@ -166,16 +166,17 @@ def _variables(root: Any, variables: tuple[Variable, ...]) -> None:
 
 def _structure(root: Any, interface: Interface, initial_dependencies: dict[int, tuple[int, ...]]) -> None:
     structure = etree.SubElement(root, "ModelStructure")
+    index = {variable.value_reference: str(place) for place, variable in enumerate(interface.shown, 1)}
     element = etree.SubElement(structure, "Outputs")
-    for variable in interface.variables:
+    for variable in interface.shown:
         if variable.causality == "output":
-            etree.SubElement(element, "Unknown", index=str(variable.value_reference + 1), dependencies="")
+            etree.SubElement(element, "Unknown", index=index[variable.value_reference], dependencies="")
     element = etree.SubElement(structure, "InitialUnknowns")
-    for variable in interface.variables:
+    for variable in interface.shown:
         if variable.causality in ("output", "calculatedParameter"):
             reference = variable.value_reference
-            known = " ".join(str(place + 1) for place in initial_dependencies.get(reference, ()))
-            etree.SubElement(element, "Unknown", index=str(reference + 1), dependencies=known)
+            known = " ".join(index[place] for place in initial_dependencies.get(reference, ()))
+            etree.SubElement(element, "Unknown", index=index[reference], dependencies=known)
 
 
 def _co_simulation(root: Any, entry: Entry, kind: Kind) -> None:
@@ -233,8 +234,8 @@ def model_description(
         ),
     )
     _co_simulation(root, entry, kind)
-    _unit_definitions(root, interface.variables)
-    _type_definitions(root, interface.variables)
+    _unit_definitions(root, interface.shown)
+    _type_definitions(root, interface.shown)
     categories = etree.SubElement(root, "LogCategories")
     for name, text in _LOG_CATEGORIES[kind]:
         etree.SubElement(categories, "Category", name=name, description=text)
@@ -243,7 +244,7 @@ def model_description(
         "DefaultExperiment",
         _attributes(startTime=0.0, stopTime=float(entry.stop_time), stepSize=float(entry.step_size)),
     )
-    _variables(root, interface.variables)
+    _variables(root, interface.shown)
     _structure(root, interface, trace.initial_dependencies)
     xml: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     return xml

@@ -142,7 +142,7 @@ def _section(title: str, described: list[tuple[Variable, str]], prefix: str | No
 def index_page(model: Model, entry: Entry, kind: Kind, version: str) -> str:
     """documentation/index.html: conventions, errors, and every variable with unit, range and meaning."""
     interface = interface_of(model)
-    described = list(zip(interface.variables, descriptions(interface.variables), strict=True))
+    described = list(zip(interface.shown, descriptions(interface.shown), strict=True))
     sections = (
         ("Inputs", "input", None),
         ("Outputs", "output", None),

@@ -11,7 +11,7 @@ record                  FMI name               causality, variability
 none                    ``refused_calls``      output; for masters that do not look at the status of their calls
 ======================  =====================  ==================================================
 
-A variable's value reference is its place in this order, from 0.
+A variable's value reference is its place in this order, from 0. Hidden state keeps its place and is no FMI variable.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any, NamedTuple
 
-from ..models.record import Fact, Integer, Leaf, Real, leaves, refusal
+from ..models.record import Boolean, Enumeration, Fact, Integer, Leaf, Real, leaves, refusal
 from ..models.system import Model
 from .errors import InterfaceError
 
@@ -36,13 +36,18 @@ class Variable(NamedTuple):
     start: Any
 
     @property
+    def is_hidden(self) -> bool:
+        """Whether it is state that no host sees."""
+        return not isinstance(self.fact, Boolean | Enumeration) and self.fact.hidden
+
+    @property
     def kind(self) -> str:
         """FMI type: Real, Integer, Boolean or Enumeration."""
         return type(self.fact).__name__
 
 
 class Interface(NamedTuple):
-    """All variables of a model and the value references of each record."""
+    """All numbers of a model by value reference, and the value references of each record."""
 
     variables: tuple[Variable, ...]
     parameters: slice
@@ -51,6 +56,11 @@ class Interface(NamedTuple):
     coefficients: slice
     state: slice
     refused: int
+
+    @property
+    def shown(self) -> tuple[Variable, ...]:
+        """The FMI variables: all that is not hidden."""
+        return tuple(variable for variable in self.variables if not variable.is_hidden)
 
 
 _REFUSED = Leaf(

@@ -83,7 +83,7 @@ class Ports:
         """The variables behind `references`; all must be of these kinds."""
         found = []
         for reference in references:
-            if not 0 <= reference < len(self.interface.variables):
+            if not 0 <= reference < len(self.interface.variables) or self.interface.variables[reference].is_hidden:
                 raise CallRefusedError(f"there is no variable with value reference {reference}")
             variable = self.interface.variables[reference]
             if variable.kind not in kinds:

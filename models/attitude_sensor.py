@@ -31,16 +31,36 @@ from .attitude.velocity_aided import Fused, FusionParameters, FusionState, RestS
 from .filters.kalman import KalmanParameters, kalman_filtered
 from .filters.rc import RcParameters, rc_filtered
 from .record import Boolean, Enumeration, Integer, Item, Matrix3, Quaternion, Real, Vector3, choose
-from .scalar import PI, Scalar, maximum, minimum, sqrt, where
+from .scalar import PI, Scalar, both, maximum, minimum, sqrt, where
 from .sensors import accelerometer as accelerometers
 from .sensors import bias_instability, devices
 from .sensors import gyro as gyros
-from .sensors.accelerometer import AccelerometerCoefficients, AccelerometerParameters, AccelerometerState
-from .sensors.gyro import GyroCoefficients, GyroParameters, GyroState
-from .sensors.sensitivity import offset_at
-from .sensors.thermal import die_temperature, initial_die_temperature
+from .sensors.accelerometer import (
+    ACCELEROMETER_FILTER,
+    AccelerometerCoefficients,
+    AccelerometerParameters,
+    AccelerometerState,
+)
+from .sensors.gyro import GYRO_FILTER, GyroCoefficients, GyroParameters, GyroState
+from .sensors.digital_filter import TAPS, DelayLines
+from .sensors.faults import FAULT, FaultParameters, is_active
+from .sensors.sensitivity import hysteresis_loop, hysteresis_offset, with_temperature
+from .sensors.thermal import (
+    HeaterParameters,
+    HeaterState,
+    die_temperature,
+    heated,
+    initial_die_temperature,
+    initial_heater,
+    thermometer_code,
+    thermometer_reading,
+)
 from .system import Clock, Model, Rule, Task
-from .vectors import ZERO3, add, each_axis, multiply, multiply_transposed, scale, subtract, transpose
+from .vectors import IDENTITY3, ZERO3, add, each_axis, multiply, multiply_transposed, scale, subtract, transpose
+
+_NOTHING: Matrix3 = (ZERO3, ZERO3, ZERO3)
+_MOST_COUNTED = 2.0**31 - 1.0
+"""Largest count that an FMI integer holds."""
 
 SLOW_PERIOD = 0.1
 """s between steps of temperature and bias instability."""
@@ -90,6 +110,33 @@ class ProcessorParameters(NamedTuple):
     )
 
 
+class SupplyParameters(NamedTuple):
+    """What feeds the parts."""
+
+    nominal: Annotated[float, Real("V", "supply voltage at which the offsets are given", min=0.1, max=60.0)] = 5.0
+
+
+class CompensationParameters(NamedTuple):
+    """What the processor takes out of the readings, with the parts' own thermometers: M (y - b - G f).
+
+    b = b0 + b1 (T - 25 degC) + b2 (T - 25 degC)^2.
+    """
+
+    gyro_bias: Annotated[Vector3, Real("rad/s", "gyro bias taken out", display="deg/s")] = ZERO3
+    gyro_bias_temperature_slope: Annotated[Vector3, Real("rad/(s.K)", "its change with temperature")] = ZERO3
+    gyro_bias_temperature_curve: Annotated[Vector3, Real("rad/(s.K2)", "its change with temperature squared")] = ZERO3
+    gyro_matrix: Annotated[Matrix3, Real("1", "what the gyro readings are multiplied by")] = IDENTITY3
+    g_sensitivity: Annotated[Matrix3, Real("rad.s/m", "gyro reading by specific force taken out")] = _NOTHING
+    accelerometer_bias: Annotated[Vector3, Real("m/s2", "accelerometer bias taken out")] = ZERO3
+    accelerometer_bias_temperature_slope: Annotated[
+        Vector3, Real("m/(s2.K)", "change of the accelerometer bias with temperature")
+    ] = ZERO3
+    accelerometer_bias_temperature_curve: Annotated[
+        Vector3, Real("m/(s2.K2)", "change of the accelerometer bias with temperature squared")
+    ] = ZERO3
+    accelerometer_matrix: Annotated[Matrix3, Real("1", "what the accelerometer readings are multiplied by")] = IDENTITY3
+
+
 class SolverParameters(NamedTuple):
     """The attitude solution."""
 
@@ -118,6 +165,10 @@ class Parameters(NamedTuple):
     mounting: MountingParameters = MountingParameters()
     gyro: GyroParameters = GyroParameters()
     accelerometer: AccelerometerParameters = AccelerometerParameters()
+    supply: SupplyParameters = SupplyParameters()
+    heater: HeaterParameters = HeaterParameters()
+    fault: tuple[FaultParameters, FaultParameters] = (FaultParameters(), FaultParameters())
+    compensation: CompensationParameters = CompensationParameters()
     processor: ProcessorParameters = ProcessorParameters()
     alignment: AlignmentParameters = AlignmentParameters()
     solver: SolverParameters = SolverParameters()
@@ -153,23 +204,35 @@ class Inputs(NamedTuple):
     temperature: Annotated[float, Real("K", "ambient temperature", min=200.0, max=450.0, display="degC")] = (
         devices.REFERENCE_TEMPERATURE
     )
+    supply_voltage: Annotated[float, Real("V", "voltage that feeds the parts", min=0.0, max=60.0)] = 5.0
     heading_aid: Annotated[float, Real("rad", "outside yaw, used once at the end of the alignment", display="deg")] = (
         0.0
     )
 
 
+class WanderingOffset(NamedTuple):
+    """What moves a part's offset slowly, on each axis; whose offset it is gives the unit."""
+
+    instability: bias_instability.Processes
+    walk: Vector3
+    turn_on: Vector3
+
+
 class SlowState(NamedTuple):
     """Temperatures and wandering offsets, stepped slowly."""
 
-    started: Annotated[float, Boolean("the bias instability has been drawn")]
-    gyro_instability: Annotated[bias_instability.Processes, Real("rad/s", "Gauss-Markov processes of the gyro biases")]
-    accelerometer_instability: Annotated[
-        bias_instability.Processes, Real("m/s2", "Gauss-Markov processes of the accelerometer biases")
-    ]
+    started: Annotated[float, Boolean("the bias instability and the turn-on bias have been drawn")]
+    gyro_wander: Annotated[WanderingOffset, Real("rad/s", "wandering gyro offset", display="deg/s")]
+    accelerometer_wander: Annotated[WanderingOffset, Real("m/s2", "wandering accelerometer offset")]
+    heater: HeaterState
     gyro_temperature: Annotated[float, Real("K", "die temperature of the gyros", display="degC")]
     accelerometer_temperature: Annotated[float, Real("K", "die temperature of the accelerometer", display="degC")]
+    gyro_loop: Annotated[float, Real("K", "hysteresis loop of the gyros", display="degC")]
+    accelerometer_loop: Annotated[float, Real("K", "hysteresis loop of the accelerometer", display="degC")]
     gyro_offset: Annotated[Vector3, Real("rad/s", "all that the gyros read too much at rest", display="deg/s")]
     accelerometer_offset: Annotated[Vector3, Real("m/s2", "all that the accelerometer reads too much")]
+    gyro_scale: Annotated[Vector3, Real("1", "sensitivity of the gyros over that at 25 degC")]
+    accelerometer_scale: Annotated[Vector3, Real("1", "sensitivity of the accelerometer over that at 25 degC")]
 
 
 class ReadingState(NamedTuple):
@@ -177,6 +240,11 @@ class ReadingState(NamedTuple):
 
     rate: Annotated[Vector3, Real("rad/s", "rate as read", display="deg/s")]
     specific_force: Annotated[Vector3, Real("m/s2", "specific force as read")]
+    gyro_words: Annotated[Vector3, Real("1", "gyro words until the last reading")]
+    accelerometer_words: Annotated[float, Real("1", "accelerometer words until the last reading")]
+    repeated: Annotated[float, Integer("words that were read more than once")]
+    missed: Annotated[float, Integer("words that were never read")]
+    readings: Annotated[float, Real("1", "readings so far")]
 
 
 class AttitudeState(NamedTuple):
@@ -207,6 +275,8 @@ class State(NamedTuple):
     reading: ReadingState
     attitude: AttitudeState
     filter: FilterState
+    gyro_lines: tuple[DelayLines, DelayLines, DelayLines]
+    accelerometer_lines: tuple[DelayLines, DelayLines, DelayLines]
 
 
 class RegisterOutputs(NamedTuple):
@@ -254,15 +324,29 @@ def coefficients(p: Parameters) -> Coefficients:
     )
 
 
-def _offsets(p: Parameters, gyro_temperature: Scalar, accelerometer_temperature: Scalar) -> tuple[Vector3, Vector3]:
-    def gyro(axis: int) -> Scalar:
-        return offset_at(p.gyro.bias[axis], p.gyro.bias_temperature_slope[axis], gyro_temperature)
+class _Part(NamedTuple):
+    """What the temperature makes of a part: offset and scale on each axis."""
 
-    def accelerometer(axis: int) -> Scalar:
-        part = p.accelerometer
-        return offset_at(part.bias[axis], part.bias_temperature_slope[axis], accelerometer_temperature)
+    offset: Vector3
+    scale: Vector3
 
-    return each_axis(gyro), each_axis(accelerometer)
+
+def _at_temperature(
+    part: GyroParameters | AccelerometerParameters, temperature: Scalar, loop: Scalar, volts: Scalar
+) -> _Part:
+    """Offset and scale of a part by temperature, its history and supply; what wanders comes on top."""
+    common = hysteresis_offset(loop, temperature, part.hysteresis_width, part.hysteresis)
+    common = common + part.supply_sensitivity * volts
+
+    def offset(axis: int) -> Scalar:
+        slope, curve = part.bias_temperature_slope[axis], part.bias_temperature_curve[axis]
+        return with_temperature(part.bias[axis], slope, curve, temperature) + common
+
+    def factor(axis: int) -> Scalar:
+        slope, curve = part.scale_temperature_slope[axis], part.scale_temperature_curve[axis]
+        return with_temperature(1.0, slope, curve, temperature)
+
+    return _Part(each_axis(offset), each_axis(factor))
 
 
 def _force_at_part(inputs: Inputs, p: Parameters) -> Vector3:
@@ -271,31 +355,53 @@ def _force_at_part(inputs: Inputs, p: Parameters) -> Vector3:
     )
 
 
+_STILL = WanderingOffset(bias_instability.STILL, ZERO3, ZERO3)
+
+
+def _initial_slow(p: Parameters, inputs: Inputs) -> SlowState:
+    gyro_temperature = initial_die_temperature(p.gyro.thermal, inputs.temperature)
+    part_temperature = initial_die_temperature(p.accelerometer.thermal, inputs.temperature)
+    volts = inputs.supply_voltage - p.supply.nominal
+    gyro = _at_temperature(p.gyro, gyro_temperature, gyro_temperature, volts)
+    part = _at_temperature(p.accelerometer, part_temperature, part_temperature, volts)
+    return SlowState(
+        0.0,
+        _STILL,
+        _STILL,
+        initial_heater(inputs.temperature),
+        gyro_temperature,
+        part_temperature,
+        gyro_temperature,
+        part_temperature,
+        gyro.offset,
+        part.offset,
+        gyro.scale,
+        part.scale,
+    )
+
+
 def initial_state(p: Parameters, k: Coefficients, inputs: Inputs) -> State:
     """The sensor switched on at these inputs: parts settled, noise and alignment yet to begin."""
-    gyro_temperature = initial_die_temperature(p.gyro.thermal, inputs.temperature)
-    accelerometer_temperature = initial_die_temperature(p.accelerometer.thermal, inputs.temperature)
-    gyro_offset, accelerometer_offset = _offsets(p, gyro_temperature, accelerometer_temperature)
+    slow = _initial_slow(p, inputs)
     force = _force_at_part(inputs, p)
-    still = bias_instability.STILL
-    gyro = each_axis(lambda axis: gyros.initial_gyro(axis, inputs.rate, force, gyro_offset[axis], p.gyro, k.gyro))
-    part = accelerometers.initial_accelerometer(force, accelerometer_offset, p.accelerometer, k.accelerometer)
-    reading = _reading(gyro, part, inputs, p, k)
+    gyro = each_axis(
+        lambda axis: gyros.initial_gyro(
+            axis, inputs.rate, force, slow.gyro_offset[axis], slow.gyro_scale[axis], p.gyro, k.gyro
+        )
+    )
+    part, part_lines = accelerometers.initial_accelerometer(
+        force, slow.accelerometer_offset, slow.accelerometer_scale, p.accelerometer, k.accelerometer
+    )
+    states = (gyro[0][0], gyro[1][0], gyro[2][0])
+    read = _read(states, part, slow, inputs, p, k)
+    reading = ReadingState(read.rate, read.specific_force, ZERO3, 0.0, 0.0, 0.0, 0.0)
     q_nb = levelled(reading.specific_force, inputs.heading_aid)
     euler = euler_from_matrix(matrix_from_quaternion(q_nb))
     filtered = Euler(*[where(p.filter.from_zero > 0.5, 0.0, angle) for angle in euler])
     return State(
-        gyro=gyro,
+        gyro=states,
         accelerometer=part,
-        slow=SlowState(
-            0.0,
-            still,
-            still,
-            gyro_temperature,
-            accelerometer_temperature,
-            gyro_offset,
-            accelerometer_offset,
-        ),
+        slow=slow,
         reading=reading,
         attitude=AttitudeState(
             aligned=0.0,
@@ -308,6 +414,8 @@ def initial_state(p: Parameters, k: Coefficients, inputs: Inputs) -> State:
             ),
         ),
         filter=FilterState(where(p.filter.from_zero > 0.5, 1.0, 0.0), filtered, (p.filter.kalman.R,) * 3),
+        gyro_lines=(gyro[0][1], gyro[1][1], gyro[2][1]),
+        accelerometer_lines=part_lines,
     )
 
 
@@ -319,7 +427,7 @@ def _with_gyro(state: State, axis: int, gyro: GyroState) -> State:
     replaced = (
         (gyro, three[1], three[2]) if axis == 0 else (three[0], gyro, three[2]) if axis == 1 else (*three[:2], gyro)
     )
-    return State(replaced, state.accelerometer, state.slow, state.reading, state.attitude, state.filter)
+    return State(replaced, *state[1:])
 
 
 TaskStep = Callable[[State, Inputs, Parameters, Coefficients, tuple[Any, ...]], State]
@@ -328,8 +436,11 @@ TaskStep = Callable[[State, Inputs, Parameters, Coefficients, tuple[Any, ...]], 
 def _gyro_sense(axis: int) -> TaskStep:
     sense = gyros.sense(axis)
 
-    def step(state: State, inputs: Inputs, _p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
-        return _with_gyro(state, axis, sense(state.gyro[axis], inputs.rate, inputs.specific_force, k.gyro))
+    def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
+        factor = state.slow.gyro_scale[axis]
+        return _with_gyro(
+            state, axis, sense(state.gyro[axis], inputs.rate, inputs.specific_force, factor, p.gyro, k.gyro)
+        )
 
     return step
 
@@ -338,78 +449,222 @@ def _gyro_register(axis: int) -> TaskStep:
     register = gyros.register(axis)
 
     def step(state: State, _inputs: Inputs, p: Parameters, k: Coefficients, draws: tuple[Any, ...]) -> State:
-        return _with_gyro(state, axis, register(state.gyro[axis], state.slow.gyro_offset[axis], p.gyro, k.gyro, draws))
+        offset = state.slow.gyro_offset[axis]
+        return _with_gyro(state, axis, register(state.gyro[axis], offset, p.gyro, k.gyro, p.fault, draws))
+
+    return step
+
+
+def _gyro_sample(axis: int, taps: int) -> TaskStep:
+    sample = gyros.sample(axis, taps)
+
+    def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, draws: tuple[Any, ...]) -> State:
+        slow, lines = state.slow, state.gyro_lines
+        gyro, after = sample(
+            state.gyro[axis],
+            lines[axis],
+            inputs.rate,
+            inputs.specific_force,
+            slow.gyro_scale[axis],
+            slow.gyro_offset[axis],
+            p.gyro,
+            k.gyro,
+            p.fault,
+            draws,
+        )
+        replaced = (
+            (after, *lines[1:]) if axis == 0 else (lines[0], after, lines[2]) if axis == 1 else (*lines[:2], after)
+        )
+        return _with_gyro(state, axis, gyro)._replace(gyro_lines=replaced)
 
     return step
 
 
 def accelerometer_sense(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
-    """The accelerometer takes an input sample."""
-    part = accelerometers.sense(state.accelerometer, _force_at_part(inputs, p), k.accelerometer)
-    return State(state.gyro, part, state.slow, state.reading, state.attitude, state.filter)
+    """The decimating accelerometer takes an input sample."""
+    factor = state.slow.accelerometer_scale
+    part = accelerometers.sense(
+        state.accelerometer, _force_at_part(inputs, p), factor, p.accelerometer, k.accelerometer
+    )
+    return State(state.gyro, part, *state[2:])
 
 
 def accelerometer_register(
     state: State, _inputs: Inputs, p: Parameters, k: Coefficients, draws: tuple[Any, ...]
 ) -> State:
-    """The accelerometer finishes an output word."""
+    """The decimating accelerometer finishes an output word."""
     part = accelerometers.register(
-        state.accelerometer, state.slow.accelerometer_offset, p.accelerometer, k.accelerometer, draws
+        state.accelerometer, state.slow.accelerometer_offset, p.accelerometer, k.accelerometer, p.fault, draws
     )
-    return State(state.gyro, part, state.slow, state.reading, state.attitude, state.filter)
+    return State(state.gyro, part, *state[2:])
+
+
+def _accelerometer_sample(taps: int) -> TaskStep:
+    sample = accelerometers.sample(taps)
+
+    def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, draws: tuple[Any, ...]) -> State:
+        part, lines = sample(
+            state.accelerometer,
+            state.accelerometer_lines,
+            _force_at_part(inputs, p),
+            state.slow.accelerometer_scale,
+            state.slow.accelerometer_offset,
+            p.accelerometer,
+            k.accelerometer,
+            p.fault,
+            draws,
+        )
+        return State(state.gyro, part, *state[2:-1], lines)
+
+    return step
+
+
+_WANDER_DRAWS = 3 * bias_instability.PROCESSES + 6
+"""Normals that an offset's wandering takes a step: the processes, the walk, the turn-on bias."""
+
+
+def _wandered(
+    wander: WanderingOffset,
+    part: GyroParameters | AccelerometerParameters,
+    sigma: Scalar,
+    started: Scalar,
+    draws: tuple[Any, ...],
+) -> WanderingOffset:
+    """Instability, random walk and turn-on bias one slow period later; the first call draws what they start from."""
+    begun = started > 0.5
+    decay = tuple(where(begun, a, 0.0) for a in bias_instability.decays(SLOW_PERIOD))
+    step = part.rate_random_walk * SLOW_PERIOD**0.5
+    first = 3 * bias_instability.PROCESSES
+    return WanderingOffset(
+        bias_instability.stepped(wander.instability, decay, sigma, draws[:first]),
+        each_axis(lambda i: wander.walk[i] + step * draws[first + i]),
+        each_axis(lambda i: where(begun, wander.turn_on[i], part.turn_on_bias * draws[first + 3 + i])),
+    )
+
+
+def _total(wander: WanderingOffset) -> Vector3:
+    return add(bias_instability.total(wander.instability), add(wander.walk, wander.turn_on))
 
 
 def slow_step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, draws: tuple[Any, ...]) -> State:
-    """Die temperatures and bias instability go on by one slow period; the first call draws their stationary start."""
+    """Temperatures, offsets and sensitivities go on by one slow period."""
     slow = state.slow
-    decay = tuple(where(slow.started > 0.5, a, 0.0) for a in bias_instability.decays(SLOW_PERIOD))
-    half = 3 * bias_instability.PROCESSES
-    gyro = bias_instability.stepped(slow.gyro_instability, decay, k.gyro.instability_sigma, draws[:half])
-    part = bias_instability.stepped(
-        slow.accelerometer_instability, decay, k.accelerometer.instability_sigma, draws[half:]
+    gyro_wander = _wandered(slow.gyro_wander, p.gyro, k.gyro.instability_sigma, slow.started, draws[:_WANDER_DRAWS])
+    part_wander = _wandered(
+        slow.accelerometer_wander,
+        p.accelerometer,
+        k.accelerometer.instability_sigma,
+        slow.started,
+        draws[_WANDER_DRAWS:],
     )
-    gyro_temperature = die_temperature(p.gyro.thermal, slow.gyro_temperature, inputs.temperature, SLOW_PERIOD)
+    heater = heated(slow.heater, p.heater, inputs.temperature, SLOW_PERIOD)
+    gyro_temperature = die_temperature(p.gyro.thermal, slow.gyro_temperature, heater.temperature, SLOW_PERIOD)
     part_temperature = die_temperature(
-        p.accelerometer.thermal, slow.accelerometer_temperature, inputs.temperature, SLOW_PERIOD
+        p.accelerometer.thermal, slow.accelerometer_temperature, heater.temperature, SLOW_PERIOD
     )
-    gyro_offset, part_offset = _offsets(p, gyro_temperature, part_temperature)
+    gyro_loop = hysteresis_loop(slow.gyro_loop, gyro_temperature, p.gyro.hysteresis_width)
+    part_loop = hysteresis_loop(slow.accelerometer_loop, part_temperature, p.accelerometer.hysteresis_width)
+    volts = inputs.supply_voltage - p.supply.nominal
+    gyro = _at_temperature(p.gyro, gyro_temperature, gyro_loop, volts)
+    part = _at_temperature(p.accelerometer, part_temperature, part_loop, volts)
     after = SlowState(
         1.0,
-        gyro,
-        part,
+        gyro_wander,
+        part_wander,
+        heater,
         gyro_temperature,
         part_temperature,
-        add(gyro_offset, bias_instability.total(gyro)),
-        add(part_offset, bias_instability.total(part)),
+        gyro_loop,
+        part_loop,
+        add(gyro.offset, _total(gyro_wander)),
+        add(part.offset, _total(part_wander)),
+        gyro.scale,
+        part.scale,
     )
-    return State(state.gyro, state.accelerometer, after, state.reading, state.attitude, state.filter)
+    return State(state.gyro, state.accelerometer, after, *state[3:])
 
 
 # --- the processor ---------------------------------------------------------------------------------------------------
 
 
-def _reading(
+class _Read(NamedTuple):
+    rate: Vector3
+    specific_force: Vector3
+
+
+def _compensated(rate: Vector3, force: Vector3, slow: SlowState, p: Parameters) -> _Read:
+    """Readings without what the processor knows to be errors, by the temperatures that the parts' thermometers read."""
+    c = p.compensation
+    gyro_meter, part_meter = p.gyro.thermometer, p.accelerometer.thermometer
+    gyro_temperature = thermometer_reading(gyro_meter, thermometer_code(gyro_meter, slow.gyro_temperature))
+    part_temperature = thermometer_reading(part_meter, thermometer_code(part_meter, slow.accelerometer_temperature))
+
+    def part_bias(i: int) -> Scalar:
+        slope, curve = c.accelerometer_bias_temperature_slope[i], c.accelerometer_bias_temperature_curve[i]
+        return with_temperature(c.accelerometer_bias[i], slope, curve, part_temperature)
+
+    def gyro_bias(i: int) -> Scalar:
+        slope, curve = c.gyro_bias_temperature_slope[i], c.gyro_bias_temperature_curve[i]
+        return with_temperature(c.gyro_bias[i], slope, curve, gyro_temperature)
+
+    true_force = multiply(c.accelerometer_matrix, subtract(force, each_axis(part_bias)))
+    pushed = multiply(c.g_sensitivity, true_force)
+    true_rate = multiply(c.gyro_matrix, subtract(subtract(rate, each_axis(gyro_bias)), pushed))
+    return _Read(true_rate, true_force)
+
+
+def _read(
     gyro: tuple[GyroState, GyroState, GyroState],
     part: AccelerometerState,
+    slow: SlowState,
     inputs: Inputs,
     p: Parameters,
     k: Coefficients,
-) -> ReadingState:
-    """Registers in SI units; an ideal part shows the truth instead."""
-    ideal = p.ideal > 0.5
-    true_rate = multiply(k.C_sb, inputs.rate)
-    true_force = multiply(k.C_sb, _force_at_part(inputs, p))
-    return ReadingState(
-        each_axis(lambda i: where(ideal, true_rate[i], gyro[i].code * p.gyro.resolution)),
-        each_axis(lambda i: where(ideal, true_force[i], part.code[i] * p.accelerometer.resolution)),
+) -> _Read:
+    """Registers in SI units, compensated; an ideal part shows the truth instead."""
+    rate = each_axis(lambda i: gyro[i].code * p.gyro.resolution)
+    force = each_axis(lambda i: part.code[i] * p.accelerometer.resolution)
+    read = _compensated(rate, force, slow, p)
+    truth = _Read(multiply(k.C_sb, inputs.rate), multiply(k.C_sb, _force_at_part(inputs, p)))
+    return _Read(
+        each_axis(lambda i: where(p.ideal > 0.5, truth.rate[i], read.rate[i])),
+        each_axis(lambda i: where(p.ideal > 0.5, truth.specific_force[i], read.specific_force[i])),
     )
 
 
+def _lost(channel: int, p: Parameters, time: Scalar) -> Scalar:
+    """1.0 where the word of a channel does not reach the processor."""
+    lost: Scalar = 0.0
+    for fault in p.fault:
+        gone = both(fault.kind == FAULT.value("lost_frames"), is_active(fault, channel, time))
+        lost = where(gone, 1.0, lost)
+    return lost
+
+
 def acquire(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
-    """The processor's timer fires: the registers are read."""
-    attitude = state.attitude._replace(rate_before=state.reading.rate)
-    reading = _reading(state.gyro, state.accelerometer, inputs, p, k)
-    return State(state.gyro, state.accelerometer, state.slow, reading, attitude, state.filter)
+    """The processor's timer fires: the registers are read; words are counted that come twice or not at all."""
+    before = state.reading
+    attitude = state.attitude._replace(rate_before=before.rate)
+    read = _read(state.gyro, state.accelerometer, state.slow, inputs, p, k)
+    readings = before.readings + 1.0
+    time = readings * k.processor_period
+    words = (state.gyro[0].words, state.gyro[1].words, state.gyro[2].words)
+    fresh = [words[i] - before.gyro_words[i] for i in range(3)]
+    fresh.append(state.accelerometer.words - before.accelerometer_words)
+    repeated, missed = before.repeated, before.missed
+    for count in fresh:
+        repeated = repeated + where(count < 0.5, 1.0, 0.0)
+        missed = missed + maximum(count - 1.0, 0.0)
+    reading = ReadingState(
+        each_axis(lambda i: where(_lost(i, p, time) > 0.5, before.rate[i], read.rate[i])),
+        each_axis(lambda i: where(_lost(3 + i, p, time) > 0.5, before.specific_force[i], read.specific_force[i])),
+        words,
+        state.accelerometer.words,
+        minimum(repeated, _MOST_COUNTED),
+        minimum(missed, _MOST_COUNTED),
+        readings,
+    )
+    return State(state.gyro, state.accelerometer, state.slow, reading, attitude, *state[5:])
 
 
 class _Start(NamedTuple):
@@ -483,7 +738,7 @@ def _solver(running: Callable[[AttitudeState, ReadingState, Parameters], Solutio
         solved = AttitudeState(
             where(aligned, 1.0, done), now.alignment, now.q_nb, attitude.rate_before, now.bias, now.fusion
         )
-        return State(state.gyro, state.accelerometer, state.slow, reading, solved, state.filter)
+        return State(state.gyro, state.accelerometer, state.slow, reading, solved, *state[5:])
 
     return step
 
@@ -497,14 +752,7 @@ def _filter(
         begun = before.started > 0.5
         start = Euler(*[where(begun, y, angle) for y, angle in zip(before.euler, solved, strict=True)])
         euler, variance = filtered(start, before.variance, solved, p.filter)
-        return State(
-            state.gyro,
-            state.accelerometer,
-            state.slow,
-            state.reading,
-            state.attitude,
-            FilterState(1.0, euler, variance),
-        )
+        return State(*state[:5], FilterState(1.0, euler, variance), *state[6:])
 
     return step
 
@@ -552,21 +800,66 @@ def outputs(state: State, _p: Parameters, _k: Coefficients) -> Outputs:
     )
 
 
+_TAPS_RULE = (
+    "the ADIS16354 takes +-150 deg/s with 4 taps or more (bartlett_4), +-75 deg/s with 16 or more, +-300 deg/s always; "
+    "the register word ends at gyro.code_limit LSB of gyro.resolution"
+)
+
+
+def _gyro_range(p: Parameters) -> tuple[Scalar, Scalar]:
+    """What taps and register word leave of the gyros' range."""
+    taps = p.gyro.filter
+    least = where(
+        taps == GYRO_FILTER.value("cic"),
+        0.0,
+        where(
+            taps >= GYRO_FILTER.value("bartlett_16"),
+            75.0,
+            where(taps >= GYRO_FILTER.value("bartlett_4"), 150.0, 300.0),
+        ),
+    )
+    return least * (PI / 180.0) * (1.0 - 1e-9), p.gyro.code_limit * p.gyro.resolution * (1.0 + 1e-9)
+
+
 def _rules() -> tuple[Rule, ...]:
-    """Range and resolution must fit the parts' register words."""
-
-    def longest(part: str, bits: int) -> Callable[[Parameters], tuple[Scalar, Scalar]]:
-        return lambda p: (0.0, 2.0 ** (bits - 1) * getattr(p, part).resolution * (1.0 + 1e-9))
-
-    parts = (("gyro", gyros.WORD_LENGTH), ("accelerometer", accelerometers.WORD_LENGTH))
-    why = "the register word ends at {codes} LSB of {part}.resolution"
-    return tuple(
-        Rule(f"{part}.range", why.format(codes=2 ** (bits - 1), part=part), longest(part, bits)) for part, bits in parts
+    """Range, taps and resolution must fit the parts; a fault must begin before it ends."""
+    faults = tuple(
+        Rule(
+            f"fault[{i + 1}].start",
+            "later than its end",
+            lambda p, i=i: (0.0, p.fault[i].end),  # type: ignore[misc]
+        )
+        for i in range(2)
+    )
+    return (
+        Rule("gyro.range", _TAPS_RULE, _gyro_range),
+        Rule(
+            "accelerometer.range",
+            "the register word ends at accelerometer.code_limit LSB of accelerometer.resolution",
+            lambda p: (0.0, p.accelerometer.code_limit * p.accelerometer.resolution * (1.0 + 1e-9)),
+        ),
+        *faults,
     )
 
 
 def _senses_per_register(_k: Coefficients) -> int:
     return gyros.SENSES_PER_REGISTER
+
+
+def _gyro_tasks(axis: int) -> tuple[Task, Task, Task]:
+    """A gyro with a CIC senses and updates its register; one with a Bartlett filter does all at every sample."""
+    name = f"gyro_{axis + 1}"
+
+    def kind(p: Parameters) -> Scalar:
+        return p.gyro.filter
+
+    cic = GYRO_FILTER.value("cic")
+    ways = {GYRO_FILTER.value(f"bartlett_{taps}"): _gyro_sample(axis, taps) for taps in TAPS}
+    return (
+        Task(f"{name}_sense", name, {cic: _gyro_sense(axis)}, kind),
+        Task(f"{name}_register", name, {cic: _gyro_register(axis)}, kind, _senses_per_register, normals=4),
+        Task(f"{name}_sample", name, ways, kind, normals=4),
+    )
 
 
 MODEL = Model(
@@ -589,25 +882,28 @@ MODEL = Model(
         Clock("processor", lambda k: k.processor_period),
     ),
     tasks=(
-        Task("slow", "slow", slow_step, normals=6 * bias_instability.PROCESSES),
-        *(Task(f"gyro_{axis + 1}_sense", f"gyro_{axis + 1}", _gyro_sense(axis)) for axis in range(3)),
-        *(
-            Task(
-                f"gyro_{axis + 1}_register",
-                f"gyro_{axis + 1}",
-                _gyro_register(axis),
-                every=_senses_per_register,
-                normals=2,
-            )
-            for axis in range(3)
+        Task("slow", "slow", slow_step, normals=2 * _WANDER_DRAWS),
+        *[task for axis in range(3) for task in _gyro_tasks(axis)],
+        Task(
+            "accelerometer_sense",
+            "accelerometer",
+            {ACCELEROMETER_FILTER.value("decimator"): accelerometer_sense},
+            choice=lambda p: p.accelerometer.filter,
         ),
-        Task("accelerometer_sense", "accelerometer", accelerometer_sense),
         Task(
             "accelerometer_register",
             "accelerometer",
-            accelerometer_register,
+            {ACCELEROMETER_FILTER.value("decimator"): accelerometer_register},
+            choice=lambda p: p.accelerometer.filter,
             every=lambda k: k.accelerometer.decimation,
-            normals=6,
+            normals=10,
+        ),
+        Task(
+            "accelerometer_sample",
+            "accelerometer",
+            {ACCELEROMETER_FILTER.value(f"bartlett_{taps}"): _accelerometer_sample(taps) for taps in TAPS},
+            choice=lambda p: p.accelerometer.filter,
+            normals=10,
         ),
         Task("acquire", "processor", acquire),
         Task(

@@ -23,7 +23,10 @@ from .scalar import Scalar, where
 
 
 class Real(NamedTuple):
-    """A real number: unit in FMI notation, text, allowed range, display unit, magnitude, tunable while running."""
+    """A real number: unit in FMI notation, text, allowed range, display unit, magnitude, tunable while running.
+
+    What is hidden is part of the state, and no FMI variable: long memories that nobody looks at.
+    """
 
     unit: str
     description: str
@@ -32,6 +35,7 @@ class Real(NamedTuple):
     display: str | None = None
     nominal: float | None = None
     tunable: bool = False
+    hidden: bool = False
 
 
 class Integer(NamedTuple):
@@ -42,6 +46,7 @@ class Integer(NamedTuple):
     max: int | None = None
     tunable: bool = False
     unit: str = "1"
+    hidden: bool = False
 
 
 class Boolean(NamedTuple):

@@ -57,8 +57,8 @@ class Clock(NamedTuple):
 class Task(NamedTuple):
     """A pure step ``(state, inputs, parameters, coefficients, normals) -> state`` that runs every n-th tick of a clock.
 
-    `step` is one function, or one for each value of the enumeration parameter that `choice` reads.
-    `normals` is the number of standard normal draws that a call takes.
+    `step` is one function, or one for each value of the enumeration parameter that `choice` reads; at a value without
+    one the task rests. `normals` is the number of standard normal draws that a call takes.
     """
 
     name: str
@@ -68,12 +68,12 @@ class Task(NamedTuple):
     every: Callable[[Any], Any] = _once
     normals: int = 0
 
-    def chosen(self, parameters: Any) -> Step:
-        """The step that these parameters ask for."""
+    def chosen(self, parameters: Any) -> Step | None:
+        """The step that these parameters ask for, None where the task rests."""
         if callable(self.step):
             return self.step
         assert self.choice is not None
-        return self.step[int(self.choice(parameters))]
+        return self.step.get(int(self.choice(parameters)))
 
     def alternatives(self) -> dict[str, Step]:
         """Every step of the task by a name of its own."""
@@ -188,13 +188,13 @@ class Run:
             [
                 _Scheduled(
                     task.name,
-                    task.chosen(self.parameters),
+                    step,
                     int(task.every(self.coefficients)),
                     task.normals,
                     (seed, stream_of(task.name)),
                 )
                 for task in self.model.tasks
-                if task.clock == clock.name
+                if task.clock == clock.name and (step := task.chosen(self.parameters)) is not None
             ]
             for clock in self.model.clocks
         ]

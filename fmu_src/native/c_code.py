@@ -140,7 +140,10 @@ def _tables(trace: Trace) -> Iterator[str]:
     places = {variable.name: variable.value_reference for variable in variables}
     yield from _table(
         "Variable VARIABLE[VARIABLES]",
-        (f"{{{text(variable.name)}, {variable.kind.upper()}}}" for variable in variables),
+        (
+            f"{{{text(variable.name)}, {'HIDDEN' if variable.is_hidden else variable.kind.upper()}}}"
+            for variable in variables
+        ),
     )
     yield from _table(
         "Settable SETTABLE[OUTPUTS_AT]", (_settable(variable) for variable in variables[: trace.interface.inputs.stop])

@@ -1,30 +1,49 @@
-"""A three-axis digital accelerometer (ADXL355) at its own clock.
+"""A three-axis digital accelerometer at its own clock: ADXL355, or the accelerometers of an ADIS16354.
 
-The signal's way: lever arm, sensitivity and mounting, anti-alias bandwidth (sensed at 4 kHz); white noise, sinc^2
-decimation to the output data rate, offset, range, register word; the word appears after the filter's extra latency.
+The signal's way: lever arm, sensitivity and mounting, temperature, nonlinearity, rectification; white noise; digital
+filter; offset, fault, range, register word. Two digital filters are offered:
+
+* ``decimator``, the ADXL355's: first stage at 4 kHz, sinc^2 decimation to the output data rate, high-pass; the word
+  appears after the filter's extra latency;
+* ``bartlett_1`` to ``bartlett_64``, the ADIS16354's at every sample.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
-from ..record import Boolean, Enumeration, Integer, Item, Matrix3, Real, Vector3
-from ..scalar import PI, Scalar, maximum, minimum, round_half_up, where
+from ..record import Boolean, Enumeration, Integer, Item, Matrix3, Real, Vector3, choose
+from ..scalar import PI, Scalar, absolute, both, clip, exp, floor, maximum, minimum, where
 from ..system import STOPPED
-from ..vectors import add, cross, each_axis, multiply, scale
+from ..vectors import ZERO3, add, cross, dot, each_axis, multiply, scale
 from . import devices
 from .bandwidth import low_pass, low_pass_gain
 from .bias_instability import SIGMA_PER_INSTABILITY
-from .digital_filter import sinc2_decimated
+from .digital_filter import (
+    BARTLETT_ITEMS,
+    CONVERTER_STEPS,
+    BartlettSums,
+    DelayLines,
+    FourTaps,
+    bartlett,
+    converted,
+    delaying_taps,
+    four_tapped,
+    settled_bartlett,
+    sinc2_decimated,
+    taps_of,
+)
+from .faults import FaultParameters, faulted
 from .quantiser import over_range, register_code
-from .sensitivity import sensitivity_matrix
-from .thermal import ThermalParameters
+from .sensitivity import bent, cubic_gains, sensitivity_matrix
+from .thermal import ThermalParameters, ThermometerParameters
 from .white_noise import block_sums, sample_deviation
 
 _SHEET = devices.ADXL355
 _BOARD = devices.BOARD
-_DECIMATIONS = int(_SHEET.decimations.value)
-WORD_LENGTH = int(_SHEET.word_length.value)
+_DELAYS = devices.ADXL355_DELAYS
+"""ms from an input to its word, by output data rate."""
 
 OUTPUT_DATA_RATE = Enumeration(
     "OutputDataRate",
@@ -33,43 +52,109 @@ OUTPUT_DATA_RATE = Enumeration(
             f"{_SHEET.sampling_frequency.value / 2**i:.4g}_Hz".replace(".", "_"),
             f"{_SHEET.sampling_frequency.value / 2**i:.4g} samples a second",
         )
-        for i in range(_DECIMATIONS)
+        for i in range(len(_DELAYS))
     ),
-    "output data rate, FILTER register [3:0]",
+    "output data rate of the decimator, FILTER register [3:0]",
 )
+HIGH_PASS = Enumeration(
+    "HighPass",
+    (
+        Item("none", "no high-pass"),
+        *(
+            Item(f"corner_{code}", f"corner at {corner.value:.4g} of the output data rate, code {code}")
+            for code, corner in enumerate(devices.ADXL355_HIGH_PASS, 1)
+        ),
+    ),
+    "high-pass, FILTER register [6:4]",
+)
+ACCELEROMETER_FILTER = Enumeration(
+    "AccelerometerFilter",
+    (Item("decimator", "ADXL355: decimation to the output data rate"), *BARTLETT_ITEMS),
+    "digital filter of the accelerometer",
+)
+FIRST_STAGE_CURVATURE = 0.32
+"""1 - |H| of the first stage at a quarter of its rate: -3.6 dB at 1 kHz (Rev. D p. 26), full path."""
 
 
 class AccelerometerParameters(NamedTuple):
-    """An ADXL355 and what is peculiar to this board's."""
+    """An accelerometer and what is peculiar to this board's."""
 
+    filter: Annotated[int, ACCELEROMETER_FILTER] = ACCELEROMETER_FILTER.value("decimator")
     range: Annotated[float, Real("m/s2", "full scale", min=1e-3)] = _SHEET.range.si
     resolution: Annotated[float, Real("m/s2", "one LSB of the data registers", min=1e-12)] = 1.0 / _SHEET.sensitivity.si
+    code_limit: Annotated[float, Integer("codes run from minus this to one less", min=2, max=2**31 - 1)] = 2 ** (
+        int(_SHEET.word_length.value) - 1
+    )
     noise_density: Annotated[float, Real("m/(s2.Hz^0.5)", "white noise, one-sided", min=0.0)] = _SHEET.noise_density.si
     bias_instability: Annotated[float, Real("m/s2", "flicker of the bias, IEEE 952 B", min=0.0)] = (
         _SHEET.bias_stability.si * devices.ALLAN_MINIMUM_TO_BIAS_INSTABILITY
     )
-    bandwidth: Annotated[float, Real("Hz", "anti-alias bandwidth before the digital filter", min=1.0)] = (
-        _SHEET.antialias_bandwidth.si
+    rate_random_walk: Annotated[float, Real("m/(s2.s^0.5)", "random walk of the bias, IEEE 952 K", min=0.0)] = 0.0
+    turn_on_bias: Annotated[float, Real("m/s2", "standard deviation of the bias from run to run", min=0.0)] = 0.0
+    bandwidth: Annotated[float, Real("Hz", "analogue bandwidth before the Bartlett filter", min=1.0)] = (
+        devices.ADIS16354_BANDWIDTH.si
     )
-    sampling_frequency: Annotated[float, Real("Hz", "nominal rate of the first decimation", min=1.0, max=1e5)] = (
-        _SHEET.sampling_frequency.si
-    )
-    first_stage_delay: Annotated[float, Real("s", "delay at the sampling frequency", min=0.0, max=0.1)] = (
-        _SHEET.first_stage_delay.si
-    )
+    sampling_frequency: Annotated[
+        float, Real("Hz", "nominal rate of the first decimation, or of conversions", min=1.0, max=1e5)
+    ] = _SHEET.sampling_frequency.si
+    divider: Annotated[int, Integer("conversions per sample of the Bartlett filter", min=1, max=4096)] = 1
     output_data_rate: Annotated[int, OUTPUT_DATA_RATE] = OUTPUT_DATA_RATE.value("500_Hz")
+    high_pass: Annotated[int, HIGH_PASS] = HIGH_PASS.value("none")
     clock_error: Annotated[float, Real("1", "relative error of the part's clock", min=-0.1, max=0.1)] = (
         _BOARD.accelerometer_clock_error
     )
+    clock_jitter: Annotated[float, Real("s", "standard deviation of the moment of a sample", min=0.0, max=1e-2)] = 0.0
     bias: Annotated[Vector3, Real("m/s2", "0 g offset at 25 degC")] = _BOARD.accelerometer_bias
     bias_temperature_slope: Annotated[Vector3, Real("m/(s2.K)", "change of the offset with temperature")] = (
         _BOARD.accelerometer_bias_temperature_slope
     )
+    bias_temperature_curve: Annotated[Vector3, Real("m/(s2.K2)", "change of the offset with temperature squared")] = (
+        ZERO3
+    )
+    hysteresis: Annotated[float, Real("m/s2", "offset after long warming, minus it after cooling", min=0.0)] = 0.0
+    hysteresis_width: Annotated[float, Real("K", "change of temperature that turns the hysteresis round", min=0.01)] = (
+        5.0
+    )
+    supply_sensitivity: Annotated[float, Real("m/(s2.V)", "change of the offset with the supply voltage")] = 0.0
     scale_error: Annotated[Vector3, Real("1", "relative error of the sensitivity at 25 degC", min=-0.5, max=0.5)] = (
         _BOARD.accelerometer_scale_error
     )
+    scale_temperature_slope: Annotated[Vector3, Real("1/K", "relative change of the sensitivity with temperature")] = (
+        ZERO3
+    )
+    scale_temperature_curve: Annotated[
+        Vector3, Real("1/K2", "relative change of the sensitivity with temperature squared")
+    ] = ZERO3
+    nonlinearity: Annotated[
+        float, Real("1", "rms deviation from the best straight line, of the full scale", min=0.0, max=0.1)
+    ] = 0.0
     cross_axis: Annotated[Matrix3, Real("1", "share of the column's axis in the row's reading", min=-0.5, max=0.5)] = (
         _BOARD.accelerometer_cross_axis
+    )
+    nonorthogonality: Annotated[
+        Vector3,
+        Real(
+            "rad",
+            "lean of the second axis to the first, the third to the first, the third to the second",
+            min=-0.2,
+            max=0.2,
+        ),
+    ] = ZERO3
+    misalignment: Annotated[Vector3, Real("rad", "rotation vector of the triad in its package", min=-0.5, max=0.5)] = (
+        ZERO3
+    )
+    rectification: Annotated[Vector3, Real("s2/m", "offset by the square of the specific force")] = ZERO3
+    overload: Annotated[
+        float, Real("m/s2", "true specific force beyond which the part falls silent for half a millisecond", min=1e-3)
+    ] = _SHEET.overload.si
+    self_test_response: Annotated[Vector3, Real("m/s2", "reading that the self-test adds")] = (
+        devices.ADXL355_SELF_TEST[0].si,
+        devices.ADXL355_SELF_TEST[0].si,
+        devices.ADXL355_SELF_TEST[1].si,
+    )
+    self_test: Annotated[bool, Boolean("the self-test is on", tunable=True)] = False
+    thermometer: ThermometerParameters = ThermometerParameters(
+        _SHEET.thermometer_sensitivity.si, _SHEET.thermometer_code.si
     )
     thermal: ThermalParameters = ThermalParameters(_SHEET.self_heating.si, _SHEET.warm_up.si)
 
@@ -78,10 +163,14 @@ class AccelerometerCoefficients(NamedTuple):
     """What follows from the parameters."""
 
     sensitivity: Annotated[Matrix3, Real("1", "reading of the row's axis by body specific force of the column")]
+    cubic: Annotated[tuple[float, float], Real("1", "gains of the nonlinearity, linear and cubic (s4/m2)")]
     sense_period: Annotated[float, Real("s", "time between inputs taken")]
+    word_period: Annotated[float, Real("s", "time between register words")]
     low_pass_gain: Annotated[float, Real("1", "share of a step taken over in a sense period")]
+    taps: Annotated[FourTaps, Real("1", "weights of the first stage")]
     decimation: Annotated[float, Integer("sense periods per output word")]
     latency: Annotated[float, Integer("sense periods from the end of a window to its word")]
+    high_pass_gain: Annotated[float, Real("1", "share of a step that the high-pass forgets in a word")]
     sample_deviation: Annotated[float, Real("m/s2", "white noise of a sample at the sampling frequency")]
     instability_sigma: Annotated[float, Real("m/s2", "standard deviation of one Gauss-Markov process of the bias")]
 
@@ -89,47 +178,57 @@ class AccelerometerCoefficients(NamedTuple):
 class AccelerometerState(NamedTuple):
     """The three axes."""
 
-    specific_force: Annotated[Vector3, Real("m/s2", "specific force behind the analogue bandwidth")]
-    sums: Annotated[Vector3, Real("m/s2", "sum of the block's samples")]
-    weighted_sums: Annotated[Vector3, Real("m/s2", "sum of the block's samples by their number")]
+    specific_force: Annotated[Vector3, Real("m/s2", "specific force as last sensed")]
+    before: Annotated[tuple[Vector3, Vector3, Vector3], Real("m/s2", "the three samples before, for the first stage")]
+    silent: Annotated[float, Integer("sense periods that an overload still silences the part")]
+    block: Annotated[Vector3, Real("m/s2", "sum of the block's samples")]
+    weighted_block: Annotated[Vector3, Real("m/s2", "sum of the block's samples by their number")]
     samples: Annotated[float, Real("1", "samples in the block so far")]
     rising: Annotated[Vector3, Real("m/s2", "rising half of the window under way")]
+    mean: Annotated[Vector3, Real("m/s2", "mean of the last block")]
+    steady: Annotated[Vector3, Real("m/s2", "what the high-pass takes away")]
+    sums: tuple[BartlettSums, BartlettSums, BartlettSums]
+    words: Annotated[float, Real("1", "register words so far")]
     pending: Annotated[Vector3, Integer("code on its way to the registers")]
     code: Annotated[Vector3, Integer("data registers")]
     over_range: Annotated[float, Boolean("a reading beyond the range")]
+    invalid: Annotated[Vector3, Boolean("the word holds no valid reading")]
 
 
-def _decimation(odr: Scalar) -> Scalar:
-    ratio: Scalar = 1.0
-    for choice in range(2, _DECIMATIONS + 1):
-        ratio = where(odr > choice - 0.5, 2.0 * ratio, ratio)
-    return ratio
-
-
-def _latency(part: AccelerometerParameters, decimation: Scalar) -> Scalar:
-    """Sense periods to add so that the delay is first_stage + 1.5 (R - 1)/fs, at most one output period.
-
-    That delay fits the table of Rev. D p. 26 within 1.6 % (calculated). The window itself delays by R/fs, the
-    analogue filter by 1/(2 pi f).
-    """
-    missing = part.first_stage_delay - 1.0 / (2.0 * PI * part.bandwidth)
-    ticks = round_half_up(missing * part.sampling_frequency + 0.5 * (decimation - 1.0) - 1.0)
-    return minimum(maximum(ticks, 1.0), decimation)
+def _chosen(choice: Scalar, values: tuple[float, ...]) -> Scalar:
+    """The value that an enumeration, counted from 1, chooses."""
+    found: Scalar = values[0]
+    for number, value in enumerate(values[1:], 2):
+        found = where(choice > number - 0.5, value, found)
+    return found
 
 
 def accelerometer_coefficients(
     part: AccelerometerParameters, mounting: Matrix3, ideal: Any
 ) -> AccelerometerCoefficients:
     """Coefficients of the part; an ideal one is read directly, its clock stands still."""
-    frequency = part.sampling_frequency * (1.0 + part.clock_error)
-    decimation = _decimation(part.output_data_rate)
+    decimates = part.filter == ACCELEROMETER_FILTER.value("decimator")
+    full = part.sampling_frequency * (1.0 + part.clock_error)
+    frequency = full / where(decimates, 1.0, 1.0 * part.divider)
+    choice = part.output_data_rate
+    decimation = where(decimates, _chosen(choice, tuple(2.0**i for i in range(len(_DELAYS)))), 1.0)
+    # the sinc^2 itself delays by R - 1 samples; whole samples of the rest are latency, the first stage does what is left
+    rest = _chosen(choice, tuple(delay.si * _SHEET.sampling_frequency.si for delay in _DELAYS)) - (decimation - 1.0)
+    latency = minimum(maximum(floor(rest - 1.0 + 1e-9), 1.0), decimation)
+    corner = _chosen(part.high_pass, (0.0, *[corner.value for corner in devices.ADXL355_HIGH_PASS]))
     return AccelerometerCoefficients(
-        sensitivity=sensitivity_matrix(part.scale_error, part.cross_axis, mounting),
+        sensitivity=sensitivity_matrix(
+            part.scale_error, part.cross_axis, part.nonorthogonality, part.misalignment, mounting
+        ),
+        cubic=cubic_gains(part.nonlinearity, part.range),
         sense_period=where(ideal > 0.5, STOPPED, 1.0 / frequency),
+        word_period=decimation / frequency,
         low_pass_gain=low_pass_gain(part.bandwidth, 1.0 / frequency),
+        taps=delaying_taps(clip(rest - latency, 1.0, 2.0), FIRST_STAGE_CURVATURE),
         decimation=decimation,
-        latency=_latency(part, decimation),
-        sample_deviation=sample_deviation(part.noise_density, frequency),
+        latency=latency,
+        high_pass_gain=1.0 - exp(-2.0 * PI * corner),
+        sample_deviation=sample_deviation(part.noise_density, full),
         instability_sigma=part.bias_instability * SIGMA_PER_INSTABILITY,
     )
 
@@ -139,63 +238,216 @@ def at_lever_arm(force: Vector3, rate: Vector3, angular_acceleration: Vector3, a
     return add(force, add(cross(angular_acceleration, arm), cross(rate, cross(rate, arm))))
 
 
-def _codes(value: Vector3, part: AccelerometerParameters) -> tuple[Vector3, Scalar]:
-    codes = each_axis(lambda i: register_code(value[i], part.range, part.resolution, WORD_LENGTH))
-    beyond = each_axis(lambda i: over_range(value[i], part.range))
-    return codes, maximum(maximum(beyond[0], beyond[1]), beyond[2])
+def _sensed(force: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients) -> Vector3:
+    """What the part makes of the true specific force at its place."""
+    square = dot(force, force)
+    x, y, z = multiply(k.sensitivity, force)
+    return (
+        bent(x * factor[0], k.cubic) + p.rectification[0] * square,
+        bent(y * factor[1], k.cubic) + p.rectification[1] * square,
+        bent(z * factor[2], k.cubic) + p.rectification[2] * square,
+    )
+
+
+class _Words(NamedTuple):
+    code: Vector3
+    over_range: Scalar
+    invalid: Vector3
+
+
+def _words(
+    values: Vector3,
+    before: Vector3,
+    p: AccelerometerParameters,
+    time: Scalar,
+    faults: tuple[FaultParameters, ...],
+    draws: tuple[Scalar, ...],
+) -> _Words:
+    """Register words of these readings, under faults."""
+    codes, beyond, invalid = [], [], []
+    for axis in range(3):
+        value = values[axis] + where(p.self_test > 0.5, p.self_test_response[axis], 0.0)
+        stuck: Scalar = 0.0
+        dropped: Scalar = 0.0
+        for fault in faults:
+            found = faulted(value, p.range, fault, 3 + axis, time, draws[axis])
+            value, stuck, dropped = found.value, stuck + found.stuck, dropped + found.dropped
+        fresh = register_code(value, p.range, p.resolution, p.code_limit)
+        codes.append(where(dropped > 0.5, 0.0, where(stuck > 0.5, before[axis], fresh)))
+        beyond.append(over_range(value, p.range))
+        invalid.append(where(dropped > 0.5, 1.0, 0.0))
+    return _Words(
+        (codes[0], codes[1], codes[2]),
+        maximum(maximum(beyond[0], beyond[1]), beyond[2]),
+        (invalid[0], invalid[1], invalid[2]),
+    )
 
 
 def initial_accelerometer(
-    force: Vector3, offset: Vector3, part: AccelerometerParameters, k: AccelerometerCoefficients
-) -> AccelerometerState:
+    force: Vector3, offset: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients
+) -> tuple[AccelerometerState, tuple[DelayLines, DelayLines, DelayLines]]:
     """The part after a long time at this specific force, without noise."""
-    sensed = multiply(k.sensitivity, force)
+    sensed = _sensed(force, factor, p, k)
     n = k.decimation
     rising = scale(0.5 * n * (n + 1.0), sensed)
-    code, beyond = _codes(add(sensed, offset), part)
-    zero = (0.0, 0.0, 0.0)
-    return AccelerometerState(sensed, zero, zero, 0.0, rising, code, code, beyond)
+    read = add(sensed, offset)
+    passes = p.high_pass == HIGH_PASS.value("none")
+    steady = choose(passes, ZERO3, read)
+    values = choose(passes, read, ZERO3)
+    code = each_axis(lambda i: register_code(values[i], p.range, p.resolution, p.code_limit))
+    beyond = each_axis(lambda i: over_range(values[i], p.range))
+    taps = taps_of(p.filter, ACCELEROMETER_FILTER.value("bartlett_1"))
+    filters = each_axis(lambda i: settled_bartlett(converted(read[i], p.resolution), taps))
+    state = AccelerometerState(
+        sensed,
+        (sensed, sensed, sensed),
+        0.0,
+        ZERO3,
+        ZERO3,
+        0.0,
+        rising,
+        sensed,
+        steady,
+        (filters[0][0], filters[1][0], filters[2][0]),
+        0.0,
+        code,
+        code,
+        maximum(maximum(beyond[0], beyond[1]), beyond[2]),
+        ZERO3,
+    )
+    return state, (filters[0][1], filters[1][1], filters[2][1])
 
 
-def sense(part: AccelerometerState, force: Vector3, k: AccelerometerCoefficients) -> AccelerometerState:
-    """Step at the sampling frequency: the true specific force enters the block; a due word reaches the registers."""
-    true_x, true_y, true_z = multiply(k.sensitivity, force)
-    gain = k.low_pass_gain
-    x = low_pass(part.specific_force[0], true_x, gain)
-    y = low_pass(part.specific_force[1], true_y, gain)
-    z = low_pass(part.specific_force[2], true_z, gain)
-    a, b, n, pending, code = part.sums, part.weighted_sums, part.samples + 1.0, part.pending, part.code
+_SILENCE = 5e-4
+"""s for which the part falls silent after an overload (Rev. D p. 24)."""
+
+
+def _silenced(state: AccelerometerState, force: Vector3, p: AccelerometerParameters, period: Scalar) -> Scalar:
+    """Sense periods of silence left: an overload starts them anew."""
+    x, y, z = force
+    most = maximum(maximum(absolute(x), absolute(y)), absolute(z))
+    return where(most > p.overload, floor(_SILENCE / period + 0.5), maximum(state.silent - 1.0, 0.0))
+
+
+def sense(
+    state: AccelerometerState, force: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients
+) -> AccelerometerState:
+    """Step of the decimating part at the sampling frequency: an input enters the block, a due word the registers."""
+    silent = _silenced(state, force, p, k.sense_period)
+    heard = where(silent > 0.5, 0.0, 1.0)
+    x, y, z = _sensed(force, factor, p, k)
+    sensed = (heard * x, heard * y, heard * z)
+    f = four_tapped(k.taps, sensed, state.before)
+    a, b, n = state.block, state.weighted_block, state.samples + 1.0
     due = n == k.latency
+    pending, code = state.pending, state.code
     return AccelerometerState(
-        (x, y, z),
-        (a[0] + x, a[1] + y, a[2] + z),
-        (b[0] + n * x, b[1] + n * y, b[2] + n * z),
+        sensed,
+        (sensed, state.before[0], state.before[1]),
+        silent,
+        (a[0] + f[0], a[1] + f[1], a[2] + f[2]),
+        (b[0] + n * f[0], b[1] + n * f[1], b[2] + n * f[2]),
         n,
-        part.rising,
+        state.rising,
+        state.mean,
+        state.steady,
+        state.sums,
+        state.words + where(due, 1.0, 0.0),
         pending,
         (where(due, pending[0], code[0]), where(due, pending[1], code[1]), where(due, pending[2], code[2])),
-        part.over_range,
+        state.over_range,
+        state.invalid,
     )
 
 
 def register(
     state: AccelerometerState,
     offset: Vector3,
-    part: AccelerometerParameters,
+    p: AccelerometerParameters,
     k: AccelerometerCoefficients,
+    faults: tuple[FaultParameters, ...],
     draws: tuple[Scalar, ...],
 ) -> AccelerometerState:
-    """Step at the output data rate: noise, decimation, offset, range and the next register word."""
-    values, rising = [], []
+    """Step at the output data rate: noise, decimation, offset, high-pass, fault, range and the next register word."""
+    values, rising, steady = [], [], []
+    mean = scale(1.0 / k.decimation, state.block)
+    late = p.clock_jitter * draws[6] / k.word_period
     for axis in range(3):
         noise_a, noise_b = block_sums(k.sample_deviation, k.decimation, draws[2 * axis], draws[2 * axis + 1])
         y, kept = sinc2_decimated(
-            state.rising[axis], state.sums[axis] + noise_a, state.weighted_sums[axis] + noise_b, k.decimation
+            state.rising[axis], state.block[axis] + noise_a, state.weighted_block[axis] + noise_b, k.decimation
         )
-        values.append(y + offset[axis])
+        read = y + (mean[axis] - state.mean[axis]) * late + offset[axis]
+        slow = low_pass(state.steady[axis], read, k.high_pass_gain)
+        values.append(read - slow)
         rising.append(kept)
-    pending, beyond = _codes((values[0], values[1], values[2]), part)
-    zero = (0.0, 0.0, 0.0)
+        steady.append(slow)
+    time = (state.words + 1.0) * k.word_period
+    words = _words((values[0], values[1], values[2]), state.pending, p, time, faults, draws[7:10])
     return AccelerometerState(
-        state.specific_force, zero, zero, 0.0, (rising[0], rising[1], rising[2]), pending, state.code, beyond
+        state.specific_force,
+        state.before,
+        state.silent,
+        ZERO3,
+        ZERO3,
+        0.0,
+        (rising[0], rising[1], rising[2]),
+        mean,
+        (steady[0], steady[1], steady[2]),
+        state.sums,
+        state.words,
+        words.code,
+        state.code,
+        words.over_range,
+        words.invalid,
     )
+
+
+def sample(taps: int) -> Callable[..., tuple[AccelerometerState, tuple[DelayLines, DelayLines, DelayLines]]]:
+    """Step of the part with Bartlett filters: bandwidth, noise, offset, converter, filter, fault, range and word."""
+
+    def step(
+        state: AccelerometerState,
+        lines: tuple[DelayLines, DelayLines, DelayLines],
+        force: Vector3,
+        factor: Vector3,
+        offset: Vector3,
+        p: AccelerometerParameters,
+        k: AccelerometerCoefficients,
+        faults: tuple[FaultParameters, ...],
+        draws: tuple[Scalar, ...],
+    ) -> tuple[AccelerometerState, tuple[DelayLines, DelayLines, DelayLines]]:
+        true = _sensed(force, factor, p, k)
+        sensed = each_axis(lambda i: low_pass(state.specific_force[i], true[i], k.low_pass_gain))
+        late = p.clock_jitter * draws[6] / k.sense_period
+        values, sums, after = [], [], []
+        for axis in range(3):
+            jitter = (sensed[axis] - state.specific_force[axis]) * late
+            noisy = sensed[axis] + jitter + k.sample_deviation * draws[2 * axis] + offset[axis]
+            limited = clip(noisy, -2.0 * p.range, 2.0 * p.range)
+            y, one_sums, one_lines = bartlett(state.sums[axis], lines[axis], converted(limited, p.resolution), taps)
+            values.append(y * (p.resolution / CONVERTER_STEPS))
+            sums.append(one_sums)
+            after.append(one_lines)
+        counted = state.words + 1.0
+        words = _words((values[0], values[1], values[2]), state.code, p, counted * k.word_period, faults, draws[7:10])
+        part = AccelerometerState(
+            sensed,
+            state.before,
+            state.silent,
+            state.block,
+            state.weighted_block,
+            state.samples,
+            state.rising,
+            state.mean,
+            state.steady,
+            (sums[0], sums[1], sums[2]),
+            counted,
+            words.code,
+            words.code,
+            words.over_range,
+            words.invalid,
+        )
+        return part, (after[0], after[1], after[2])
+
+    return step

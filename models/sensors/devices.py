@@ -1,7 +1,8 @@
 """The parts as data: every number of a datasheet once, in the datasheet's unit, with its source and how sure it is.
 
 Confidence of a number: ``datasheet`` (read in its text), ``figure`` (read by eye off a figure, +-20 % or worse),
-``driver`` (read in driver source), ``calculated`` (from such numbers), ``assumption`` (engineering judgement).
+``driver`` (read in driver source), ``sister`` (datasheet of a sister part), ``recalled`` (from memory, not seen),
+``calculated`` (from such numbers), ``assumption`` (engineering judgement).
 The sheets: ADXRS450 Rev. 0 (1/2011), ADXL354/ADXL355 Rev. D (6/2025) and Rev. 0 (9/2016).
 """
 
@@ -34,6 +35,9 @@ _SI_FACTOR = {
     "ug/rtHz": 1e-6 * STANDARD_GRAVITY,
     "mg/degC": 1e-3 * STANDARD_GRAVITY,
     "LSB/g": 1.0 / STANDARD_GRAVITY,
+    "LSB": 1.0,
+    "LSB/degC": 1.0,
+    "cycles": 1.0,
 }
 CELSIUS_ZERO = 273.15
 REFERENCE_TEMPERATURE = 25.0 + CELSIUS_ZERO
@@ -69,8 +73,9 @@ class GyroSheet(NamedTuple):
     g_sensitivity: Datum
     word_length: Datum
     resonator_frequency: Datum
-    samples_per_register: Datum
     demodulator_bandwidth: Datum
+    thermometer_sensitivity: Datum
+    thermometer_code: Datum
     self_heating: Datum
     warm_up: Datum
 
@@ -85,9 +90,9 @@ class AccelerometerSheet(NamedTuple):
     offset_temperature_slope: Datum
     word_length: Datum
     sampling_frequency: Datum
-    decimations: Datum
-    antialias_bandwidth: Datum
-    first_stage_delay: Datum
+    overload: Datum
+    thermometer_sensitivity: Datum
+    thermometer_code: Datum
     self_heating: Datum
     warm_up: Datum
 
@@ -102,8 +107,9 @@ ADXRS450 = GyroSheet(
     g_sensitivity=Datum(0.03, "deg/s/g", "Rev. 0 Table 1"),
     resonator_frequency=Datum(16e3, "Hz", "Rev. 0 p. 11; 13 to 19 kHz by Table 10"),
     word_length=Datum(16, "1", "Rev. 0 Table 9"),
-    samples_per_register=Datum(32, "1", "Rev. 0 p. 11: 500 Hz at f0 = 16 kHz; the window is four times as long"),
     demodulator_bandwidth=Datum(10.6e3, "Hz", "Rev. 0 p. 11, three blocks below 5 us each", "calculated"),
+    thermometer_sensitivity=Datum(5.0, "LSB/degC", "Rev. 0 Table 1"),
+    thermometer_code=Datum(-100.0, "LSB", "0 LSB at 45 degC and 5 LSB/degC (Rev. 0 Table 1), at 25 degC", "calculated"),
     self_heating=Datum(4.5, "K", "30 mW (Rev. 0 Table 1) through 150 K/W", "assumption"),
     warm_up=Datum(60.0, "s", "small board in still air", "assumption"),
 )
@@ -116,12 +122,32 @@ ADXL355 = AccelerometerSheet(
     offset_temperature_slope=Datum(0.01, "mg/degC", "Rev. D Table 2, typical"),
     word_length=Datum(20, "1", "Rev. D Table 2"),
     sampling_frequency=Datum(4000.0, "Hz", "Rev. D p. 25, first decimation"),
-    decimations=Datum(11, "1", "Rev. D p. 27, FILTER register [3:0] codes 0 to A, each half the rate before"),
-    antialias_bandwidth=Datum(1500.0, "Hz", "Rev. D p. 25, analogue filter"),
-    first_stage_delay=Datum(0.63, "ms", "Rev. D p. 26, delay at 4000 Hz"),
+    overload=Datum(8.0, "g", "Rev. D p. 24, +-2 g range, +-25 %"),
+    thermometer_sensitivity=Datum(-9.05, "LSB/degC", "Rev. D Table 2"),
+    thermometer_code=Datum(1885.0, "LSB", "Rev. D Table 2, at 25 degC"),
     self_heating=Datum(0.1, "K", "0.66 mW (Rev. D Table 2) through 150 K/W", "assumption"),
     warm_up=Datum(60.0, "s", "small board in still air", "assumption"),
 )
+
+
+ADXL355_DELAYS = tuple(
+    Datum(value, "ms", "Rev. D p. 26, delay by output data rate, 4000 Hz first")
+    for value in (0.63, 1.00, 1.78, 3.26, 6.27, 12.34, 24.18, 47.59, 96.25, 189.58, 384.31)
+)
+ADXL355_HIGH_PASS = tuple(
+    Datum(value, "1", "Rev. D p. 27, corner over output data rate, codes 001 to 110")
+    for value in (24.7e-4, 6.2084e-4, 1.5545e-4, 0.3862e-4, 0.0954e-4, 0.0238e-4)
+)
+ADXL355_SELF_TEST = (
+    Datum(0.3, "g", "Rev. D Table 2, X and Y, typical"),
+    Datum(1.5, "g", "Rev. D Table 2, Z, typical"),
+)
+
+ADIS16354_SAMPLING_FREQUENCY = Datum(
+    819.2, "Hz", "driver registers, and sister sheet ADIS16350/55 Rev. B Table 17", "driver"
+)
+ADIS16354_BANDWIDTH = Datum(350.0, "Hz", "sister sheet Rev. B p. 19: 0.45 ms, one pole", "sister")
+ADIS16354_NULL_RESOLUTION = Datum(0.018315, "deg/s", "sister sheet Rev. B, xGYRO_OFF", "sister")
 
 
 class Specimen(NamedTuple):

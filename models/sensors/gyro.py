@@ -1,7 +1,10 @@
-"""Three single-axis digital gyros (ADXRS450), each at its own resonator's clock.
+"""Three single-axis digital gyros, each at its own clock: ADXRS450 (or 453), or the gyros of an ADIS16354.
 
-The signal's way: sensitivity and mounting, bandwidth, g-sensitivity (sensed at f0/8); white noise, sinc^2 filter over
-128/f0, offset, range, register word (updated at f0/32).
+The signal's way: sensitivity and mounting, bandwidth, temperature, g-sensitivity, nonlinearity; white noise; digital
+filter; offset, fault, range, register word. Two digital filters are offered:
+
+* ``cic``, the ADXRS450's sinc^2 over 128/f0: sensed at f0/8, register updated at f0/32;
+* ``bartlett_1`` to ``bartlett_64``, the ADIS16354's at every sample.
 """
 
 from __future__ import annotations
@@ -9,40 +12,67 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
-from ..record import Boolean, Integer, Matrix3, Real, Vector3
-from ..scalar import Scalar, where
+from ..record import Boolean, Enumeration, Integer, Item, Matrix3, Real, Vector3
+from ..scalar import Scalar, clip, round_half_up, where
 from ..system import STOPPED
 from ..vectors import dot, each_axis, matrix_product
 from . import devices
 from .bandwidth import low_pass, low_pass_gain
 from .bias_instability import SIGMA_PER_INSTABILITY
 from .digital_filter import (
+    BARTLETT_ITEMS,
+    CONVERTER_STEPS,
     EMPTY,
+    BartlettSums,
     BlockSums,
+    DelayLines,
     OverlappedWindows,
+    bartlett,
+    converted,
+    settled_bartlett,
     settled_windows,
     sinc2_overlapped,
+    taps_of,
     with_samples,
 )
+from .faults import FaultParameters, faulted
 from .quantiser import over_range, register_code
-from .sensitivity import sensitivity_matrix
-from .thermal import ThermalParameters
+from .sensitivity import bent, cubic_gains, sensitivity_matrix
+from .thermal import ThermalParameters, ThermometerParameters
 from .white_noise import block_sums, sample_deviation
 
 _SHEET = devices.ADXRS450
-WORD_LENGTH = int(_SHEET.word_length.value)
-SAMPLES_PER_REGISTER = int(_SHEET.samples_per_register.value)
+_BOARD = devices.BOARD
+SAMPLES_PER_REGISTER = 32
+"""ADXRS450: f0 over the register's rate (Rev. 0 p. 11); the window is four times as long."""
 SENSES_PER_REGISTER = 4
 SAMPLES_PER_SENSE = SAMPLES_PER_REGISTER // SENSES_PER_REGISTER
-_BOARD = devices.BOARD
+GYRO_FILTER = Enumeration(
+    "GyroFilter", (Item("cic", "ADXRS450: two-stage CIC over 128/f0"), *BARTLETT_ITEMS), "digital filter of the gyros"
+)
+AUTONULL = Enumeration(
+    "Autonull",
+    (
+        Item("none", "offset registers stay zero"),
+        Item("automatic", "one reading at the start is taken as offset (ADIS16354, COMMAND bit 0)"),
+        Item("precision", "the mean of the first 30 s is taken as offset (ADIS16354, COMMAND bit 4)"),
+    ),
+    "bias null of the part at power-up",
+)
+NULL_DURATION = 30.0
+"""s of the ADIS16354's precision null."""
 
 
 class GyroParameters(NamedTuple):
-    """A triad of ADXRS450 and what is peculiar to this board's three."""
+    """A triad of gyros and what is peculiar to this board's three."""
 
+    filter: Annotated[int, GYRO_FILTER] = GYRO_FILTER.value("cic")
     range: Annotated[float, Real("rad/s", "full scale", min=1e-3, display="deg/s")] = _SHEET.range.si
     resolution: Annotated[float, Real("rad/s", "one LSB of the rate register", min=1e-12, display="deg/s")] = (
         1.0 / _SHEET.sensitivity.si
+    )
+    code_limit: Annotated[float, Integer("codes run from minus this to one less", min=2, max=2**31 - 1)] = 2 ** (
+        int(_SHEET.word_length.value) - 1
     )
     noise_density: Annotated[float, Real("rad/(s.Hz^0.5)", "white rate noise, one-sided", min=0.0)] = (
         _SHEET.noise_density.si
@@ -50,25 +80,87 @@ class GyroParameters(NamedTuple):
     bias_instability: Annotated[float, Real("rad/s", "flicker of the bias, IEEE 952 B", min=0.0, display="deg/h")] = (
         _SHEET.bias_stability.si * devices.ALLAN_MINIMUM_TO_BIAS_INSTABILITY
     )
+    rate_random_walk: Annotated[float, Real("rad/(s.s^0.5)", "random walk of the bias, IEEE 952 K", min=0.0)] = 0.0
+    turn_on_bias: Annotated[
+        float, Real("rad/s", "standard deviation of the bias from run to run", min=0.0, display="deg/s")
+    ] = 0.0
     bandwidth: Annotated[float, Real("Hz", "analogue bandwidth before the digital filter", min=1.0)] = (
         _SHEET.demodulator_bandwidth.si
     )
     resonator_frequency: Annotated[
-        float, Real("Hz", "nominal f0, from which every rate of the part follows", min=1e3, max=1e5)
+        float, Real("Hz", "nominal f0, from which every rate of the part with a CIC follows", min=1e3, max=1e5)
     ] = _SHEET.resonator_frequency.si
-    clock_error: Annotated[Vector3, Real("1", "relative error of f0", min=-0.25, max=0.25)] = _BOARD.gyro_clock_error
+    sampling_frequency: Annotated[
+        float, Real("Hz", "nominal conversion rate of the part with a Bartlett filter", min=1.0, max=1e5)
+    ] = devices.ADIS16354_SAMPLING_FREQUENCY.si
+    divider: Annotated[int, Integer("conversions per sample of the Bartlett filter", min=1, max=4096)] = 1
+    clock_error: Annotated[Vector3, Real("1", "relative error of the part's clock", min=-0.25, max=0.25)] = (
+        _BOARD.gyro_clock_error
+    )
+    clock_jitter: Annotated[float, Real("s", "standard deviation of the moment of a sample", min=0.0, max=1e-2)] = 0.0
     bias: Annotated[Vector3, Real("rad/s", "null offset at 25 degC", display="deg/s")] = _BOARD.gyro_bias
     bias_temperature_slope: Annotated[Vector3, Real("rad/(s.K)", "change of the offset with temperature")] = (
         _BOARD.gyro_bias_temperature_slope
     )
+    bias_temperature_curve: Annotated[Vector3, Real("rad/(s.K2)", "change of the offset with temperature squared")] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+    hysteresis: Annotated[
+        float, Real("rad/s", "offset after long warming, minus it after cooling", min=0.0, display="deg/s")
+    ] = 0.0
+    hysteresis_width: Annotated[float, Real("K", "change of temperature that turns the hysteresis round", min=0.01)] = (
+        5.0
+    )
+    supply_sensitivity: Annotated[float, Real("rad/(s.V)", "change of the offset with the supply voltage")] = 0.0
     scale_error: Annotated[Vector3, Real("1", "relative error of the sensitivity", min=-0.5, max=0.5)] = (
         _BOARD.gyro_scale_error
     )
+    scale_temperature_slope: Annotated[Vector3, Real("1/K", "relative change of the sensitivity with temperature")] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+    scale_temperature_curve: Annotated[
+        Vector3, Real("1/K2", "relative change of the sensitivity with temperature squared")
+    ] = (0.0, 0.0, 0.0)
+    nonlinearity: Annotated[
+        float, Real("1", "rms deviation from the best straight line, of the full scale", min=0.0, max=0.1)
+    ] = 0.0
     cross_axis: Annotated[Matrix3, Real("1", "share of the column's axis in the row's reading", min=-0.5, max=0.5)] = (
         _BOARD.gyro_cross_axis
     )
+    nonorthogonality: Annotated[
+        Vector3,
+        Real(
+            "rad",
+            "lean of the second axis to the first, of the third to the first, of the third to the second",
+            min=-0.2,
+            max=0.2,
+        ),
+    ] = (0.0, 0.0, 0.0)
+    misalignment: Annotated[Vector3, Real("rad", "rotation vector of the triad in its package", min=-0.5, max=0.5)] = (
+        0.0,
+        0.0,
+        0.0,
+    )
     g_sensitivity: Annotated[Matrix3, Real("rad.s/m", "reading of the row's gyro by specific force of the column")] = (
         _BOARD.gyro_g_sensitivity
+    )
+    rectification: Annotated[Vector3, Real("rad.s3/m2", "offset by the square of the specific force")] = (0.0, 0.0, 0.0)
+    autonull: Annotated[int, AUTONULL] = AUTONULL.value("none")
+    null_resolution: Annotated[float, Real("rad/s", "one LSB of the offset registers", min=1e-12, display="deg/s")] = (
+        devices.ADIS16354_NULL_RESOLUTION.si
+    )
+    self_test_response: Annotated[Vector3, Real("rad/s", "reading that the self-test adds", display="deg/s")] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+    self_test: Annotated[bool, Boolean("the self-test is on", tunable=True)] = False
+    thermometer: ThermometerParameters = ThermometerParameters(
+        _SHEET.thermometer_sensitivity.si, _SHEET.thermometer_code.si
     )
     thermal: ThermalParameters = ThermalParameters(_SHEET.self_heating.si, _SHEET.warm_up.si)
 
@@ -78,10 +170,21 @@ class GyroCoefficients(NamedTuple):
 
     sensitivity: Annotated[Matrix3, Real("1", "reading of the row's gyro by body rate of the column")]
     g_sensitivity: Annotated[Matrix3, Real("rad.s/m", "reading of the row's gyro by body specific force")]
+    cubic: Annotated[tuple[float, float], Real("1", "gains of the nonlinearity, linear and cubic (s2/rad2)")]
     sense_period: Annotated[Vector3, Real("s", "time between inputs taken")]
+    word_period: Annotated[Vector3, Real("s", "time between register words")]
     low_pass_gain: Annotated[Vector3, Real("1", "share of a step taken over in a sense period")]
-    sample_deviation: Annotated[Vector3, Real("rad/s", "white noise of a sample at f0")]
+    sample_deviation: Annotated[Vector3, Real("rad/s", "white noise of a sample")]
     instability_sigma: Annotated[float, Real("rad/s", "standard deviation of one Gauss-Markov process of the bias")]
+    null_words: Annotated[Vector3, Integer("register words averaged for the bias null")]
+
+
+class NullState(NamedTuple):
+    """The bias null of the part."""
+
+    sum: Annotated[float, Integer("sum of the codes so far")]
+    offset: Annotated[float, Integer("offset register, added to the code")]
+    done: Annotated[float, Boolean("the null has ended")]
 
 
 class GyroState(NamedTuple):
@@ -91,68 +194,188 @@ class GyroState(NamedTuple):
     sensed: Annotated[float, Real("rad/s", "rate and what specific force adds to it, as last sensed")]
     block: Annotated[BlockSums, Real("rad/s", "sums of the block under way")]
     windows: Annotated[OverlappedWindows, Real("rad/s", "partial sums of the windows under way")]
+    mean: Annotated[float, Real("rad/s", "mean of the last block")]
+    sums: BartlettSums
+    words: Annotated[float, Real("1", "register words so far")]
+    null: NullState
     code: Annotated[float, Integer("rate register")]
     over_range: Annotated[float, Boolean("reading beyond the range")]
+    invalid: Annotated[float, Boolean("the word holds no valid reading")]
 
 
 def gyro_coefficients(gyro: GyroParameters, mounting: Matrix3, ideal: Any) -> GyroCoefficients:
     """Coefficients of the triad; an ideal one is read directly, its clocks stand still."""
-    perfect = ideal > 0.5
-    frequency = each_axis(lambda i: gyro.resonator_frequency * (1.0 + gyro.clock_error[i]))
-    period = each_axis(lambda i: SAMPLES_PER_SENSE / frequency[i])
+    perfect, is_cic = ideal > 0.5, gyro.filter == GYRO_FILTER.value("cic")
+    sampled = gyro.sampling_frequency / gyro.divider
+
+    def frequency(i: int) -> Scalar:
+        return where(is_cic, gyro.resonator_frequency, sampled) * (1.0 + gyro.clock_error[i])
+
+    # the converter samples noise of its full rate, however seldom it is read
+    noisy = each_axis(lambda i: where(is_cic, frequency(i), gyro.sampling_frequency * (1.0 + gyro.clock_error[i])))
+    period = each_axis(lambda i: where(is_cic, float(SAMPLES_PER_SENSE), 1.0) / frequency(i))
+    word = each_axis(lambda i: where(is_cic, float(SAMPLES_PER_REGISTER), 1.0) / frequency(i))
+    precise = gyro.autonull == AUTONULL.value("precision")
     return GyroCoefficients(
-        sensitivity=sensitivity_matrix(gyro.scale_error, gyro.cross_axis, mounting),
+        sensitivity=sensitivity_matrix(
+            gyro.scale_error, gyro.cross_axis, gyro.nonorthogonality, gyro.misalignment, mounting
+        ),
         g_sensitivity=matrix_product(gyro.g_sensitivity, mounting),
+        cubic=cubic_gains(gyro.nonlinearity, gyro.range),
         sense_period=each_axis(lambda i: where(perfect, STOPPED, period[i])),
+        word_period=word,
         low_pass_gain=each_axis(lambda i: low_pass_gain(gyro.bandwidth, period[i])),
-        sample_deviation=each_axis(lambda i: sample_deviation(gyro.noise_density, frequency[i])),
+        sample_deviation=each_axis(lambda i: sample_deviation(gyro.noise_density, noisy[i])),
         instability_sigma=gyro.bias_instability * SIGMA_PER_INSTABILITY,
+        null_words=each_axis(lambda i: where(precise, round_half_up(NULL_DURATION / word[i]), 1.0)),
     )
 
 
-def _register(
-    gyro: GyroState, value: Scalar, block: BlockSums, windows: OverlappedWindows, parameters: GyroParameters
-) -> GyroState:
-    code = register_code(value, parameters.range, parameters.resolution, WORD_LENGTH)
-    return GyroState(gyro.rate, gyro.sensed, block, windows, code, over_range(value, parameters.range))
+def initial_null(gyro: GyroParameters) -> NullState:
+    """The bias null before the first word; done where none is asked for."""
+    return NullState(0.0, 0.0, where(gyro.autonull == AUTONULL.value("none"), 1.0, 0.0))
+
+
+def _sensed(
+    axis: int, gyro: GyroState, rate: Vector3, force: Vector3, scale: Scalar, p: GyroParameters, k: GyroCoefficients
+) -> tuple[Scalar, Scalar]:
+    """The rate behind the bandwidth, and what the part makes of it and of the specific force."""
+    passed = low_pass(gyro.rate, dot(k.sensitivity[axis], rate), k.low_pass_gain[axis])
+    pushed = dot(k.g_sensitivity[axis], force) + p.rectification[axis] * dot(force, force)
+    return passed, bent(passed * scale, k.cubic) + pushed
+
+
+def _word(
+    axis: int,
+    gyro: GyroState,
+    value: Scalar,
+    offset: Scalar,
+    p: GyroParameters,
+    k: GyroCoefficients,
+    faults: tuple[FaultParameters, ...],
+    draw: Scalar,
+) -> tuple[Scalar, ...]:
+    """Words so far, bias null, code, over-range and invalid after one more word of this value."""
+    words = gyro.words + 1.0
+    time = words * k.word_period[axis]
+    value = value + offset + where(p.self_test > 0.5, p.self_test_response[axis], 0.0)
+    stuck: Scalar = 0.0
+    dropped: Scalar = 0.0
+    for fault in faults:
+        found = faulted(value, p.range, fault, axis, time, draw)
+        value, stuck, dropped = found.value, stuck + found.stuck, dropped + found.dropped
+    fresh = register_code(value, p.range, p.resolution, p.code_limit)
+    null = nulled(gyro.null, fresh, words, axis, p, k)
+    code = clip(fresh + null.offset, -p.code_limit, p.code_limit - 1.0)
+    code = where(dropped > 0.5, 0.0, where(stuck > 0.5, gyro.code, code))
+    return words, null, code, over_range(value, p.range), where(dropped > 0.5, 1.0, 0.0)
+
+
+def nulled(
+    null: NullState, code: Scalar, words: Scalar, axis: int, p: GyroParameters, k: GyroCoefficients
+) -> NullState:
+    """The bias null after one more word: offset = -mean, in whole LSB of the offset register."""
+    total = null.sum + where(null.done > 0.5, 0.0, code)
+    ends = where(null.done > 0.5, 0.0, where(words >= k.null_words[axis], 1.0, 0.0))
+    steps = round_half_up(-(total / k.null_words[axis]) * (p.resolution / p.null_resolution))
+    offset = round_half_up(clip(steps, -4096.0, 4095.0) * (p.null_resolution / p.resolution))
+    return NullState(total, where(ends > 0.5, offset, null.offset), where(ends > 0.5, 1.0, null.done))
 
 
 def initial_gyro(
-    axis: int, rate: Vector3, force: Vector3, offset: Scalar, parameters: GyroParameters, k: GyroCoefficients
-) -> GyroState:
+    axis: int,
+    rate: Vector3,
+    force: Vector3,
+    offset: Scalar,
+    scale: Scalar,
+    p: GyroParameters,
+    k: GyroCoefficients,
+) -> tuple[GyroState, DelayLines]:
     """The gyro after a long time at these inputs, without noise."""
     passed = dot(k.sensitivity[axis], rate)
-    sensed = passed + dot(k.g_sensitivity[axis], force)
+    pushed = dot(k.g_sensitivity[axis], force) + p.rectification[axis] * dot(force, force)
+    sensed = bent(passed * scale, k.cubic) + pushed
+    code = register_code(sensed + offset, p.range, p.resolution, p.code_limit)
     settled = settled_windows(sensed, float(SAMPLES_PER_REGISTER))
-    return _register(GyroState(passed, sensed, EMPTY, settled, 0.0, 0.0), sensed + offset, EMPTY, settled, parameters)
+    taps = taps_of(p.filter, GYRO_FILTER.value("bartlett_1"))
+    sums, lines = settled_bartlett(converted(sensed + offset, p.resolution), taps)
+    beyond = over_range(sensed + offset, p.range)
+    state = GyroState(passed, sensed, EMPTY, settled, sensed, sums, 0.0, initial_null(p), code, beyond, 0.0)
+    return state, lines
 
 
-def sense(axis: int) -> Callable[[GyroState, Vector3, Vector3, GyroCoefficients], GyroState]:
-    """Step of one gyro at f0/8: the true rate and specific force enter the block.
+Sense = Callable[[GyroState, Vector3, Vector3, Scalar, GyroParameters, GyroCoefficients], GyroState]
+
+
+def sense(axis: int) -> Sense:
+    """Step of one CIC gyro at f0/8: the true rate and specific force enter the block.
 
     The eight samples since the last step are taken at their mean, half way between what was sensed then and now.
     """
 
-    def step(gyro: GyroState, rate: Vector3, force: Vector3, k: GyroCoefficients) -> GyroState:
-        passed = low_pass(gyro.rate, dot(k.sensitivity[axis], rate), k.low_pass_gain[axis])
-        sensed = passed + dot(k.g_sensitivity[axis], force)
+    def step(
+        gyro: GyroState, rate: Vector3, force: Vector3, scale: Scalar, p: GyroParameters, k: GyroCoefficients
+    ) -> GyroState:
+        passed, sensed = _sensed(axis, gyro, rate, force, scale, p, k)
         block = with_samples(gyro.block, 0.5 * (gyro.sensed + sensed), float(SAMPLES_PER_SENSE))
-        return GyroState(passed, sensed, block, gyro.windows, gyro.code, gyro.over_range)
+        return GyroState(passed, sensed, block, *gyro[3:])
 
     return step
 
 
-def register(
-    axis: int,
-) -> Callable[[GyroState, Scalar, GyroParameters, GyroCoefficients, tuple[Scalar, ...]], GyroState]:
-    """Step of one gyro at f0/32: noise, filter, offset, range and register word."""
+Register = Callable[
+    [GyroState, Scalar, GyroParameters, GyroCoefficients, tuple[FaultParameters, ...], tuple[Scalar, ...]], GyroState
+]
+
+
+def register(axis: int) -> Register:
+    """Step of one CIC gyro at f0/32: noise, filter, offset, fault, range and register word."""
 
     def step(
-        gyro: GyroState, offset: Scalar, parameters: GyroParameters, k: GyroCoefficients, draws: tuple[Scalar, ...]
+        gyro: GyroState,
+        offset: Scalar,
+        p: GyroParameters,
+        k: GyroCoefficients,
+        faults: tuple[FaultParameters, ...],
+        draws: tuple[Scalar, ...],
     ) -> GyroState:
         n = float(SAMPLES_PER_REGISTER)
+        mean = gyro.block.a / n
+        jitter = (mean - gyro.mean) / k.word_period[axis] * (p.clock_jitter * draws[2])
         noise_a, noise_b = block_sums(k.sample_deviation[axis], n, draws[0], draws[1])
         y, windows = sinc2_overlapped(gyro.windows, gyro.block.a + noise_a, gyro.block.b + noise_b, n)
-        return _register(gyro, y + offset, EMPTY, windows, parameters)
+        words, null, code, beyond, invalid = _word(axis, gyro, y + jitter, offset, p, k, faults, draws[3])
+        return GyroState(gyro.rate, gyro.sensed, EMPTY, windows, mean, gyro.sums, words, null, code, beyond, invalid)
+
+    return step
+
+
+Sample = Callable[..., tuple[GyroState, DelayLines]]
+
+
+def sample(axis: int, taps: int) -> Sample:
+    """Step of one Bartlett gyro: bandwidth, noise, offset, converter, filter of `taps`, fault, range, register word."""
+
+    def step(
+        gyro: GyroState,
+        lines: DelayLines,
+        rate: Vector3,
+        force: Vector3,
+        scale: Scalar,
+        offset: Scalar,
+        p: GyroParameters,
+        k: GyroCoefficients,
+        faults: tuple[FaultParameters, ...],
+        draws: tuple[Scalar, ...],
+    ) -> tuple[GyroState, DelayLines]:
+        passed, sensed = _sensed(axis, gyro, rate, force, scale, p, k)
+        jitter = (sensed - gyro.sensed) / k.sense_period[axis] * (p.clock_jitter * draws[2])
+        noisy = sensed + jitter + k.sample_deviation[axis] * draws[0] + offset
+        limited = clip(noisy, -2.0 * p.range, 2.0 * p.range)
+        y, sums, after = bartlett(gyro.sums, lines, converted(limited, p.resolution), taps)
+        value = y * (p.resolution / CONVERTER_STEPS)
+        words, null, code, beyond, invalid = _word(axis, gyro, value, 0.0, p, k, faults, draws[3])
+        state = GyroState(passed, sensed, gyro.block, gyro.windows, gyro.mean, sums, words, null, code, beyond, invalid)
+        return state, after
 
     return step

@@ -5,10 +5,9 @@ from __future__ import annotations
 from ..scalar import Scalar, absolute, clip, round_half_up, where
 
 
-def register_code(value: Scalar, full_scale: Scalar, resolution: Scalar, bits: int) -> Scalar:
-    """Two's-complement code of `bits` of a value limited to +-full_scale; resolution is one LSB in the value's unit."""
-    half = 2.0 ** (bits - 1)
-    return clip(round_half_up(clip(value, -full_scale, full_scale) / resolution), -half, half - 1.0)
+def register_code(value: Scalar, full_scale: Scalar, resolution: Scalar, limit: Scalar) -> Scalar:
+    """Code -limit..limit - 1 of a value held within +-full_scale; resolution is one LSB in the value's unit."""
+    return clip(round_half_up(clip(value, -full_scale, full_scale) / resolution), -limit, limit - 1.0)
 
 
 def over_range(value: Scalar, full_scale: Scalar) -> Scalar:

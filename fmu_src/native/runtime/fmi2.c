@@ -160,7 +160,7 @@ static const char *const TYPE_NAME[] = {"Real", "Integer", "Boolean", "Enumerati
 /* The variable behind a reference, if it is of the type that the called function is for. */
 static fmi2Status find(Instance *instance, fmi2ValueReference reference, Type wanted)
 {
-    if (reference >= VARIABLES)
+    if (reference >= VARIABLES || VARIABLE[reference].type == HIDDEN)
         return refuse(instance, "%s: there is no variable with value reference %u", instance->name, reference);
     if (VARIABLE[reference].type == wanted || (VARIABLE[reference].type == ENUMERATION && wanted == INTEGER))
         return fmi2OK;

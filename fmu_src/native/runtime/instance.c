@@ -124,7 +124,7 @@ static Routine *chosen(const Task *task, double value)
     for (int i = task->first_way; i < task->first_way + task->ways; i++)
         if (WAY[i].value == value)
             return WAY[i].step;
-    return WAY[task->first_way].step;
+    return NULL;
 }
 
 static double due_time(const Instance *instance, int clock)
@@ -201,7 +201,7 @@ static void run_tasks(Instance *instance, int clock)
     for (int i = first; i < first + CLOCK[clock].tasks; i++) {
         const Task *task = &TASK[i];
         const int64_t every = instance->every[i];
-        if (every > 1 && tick % every)
+        if (!instance->step[i] || (every > 1 && tick % every))
             continue;
         if (task->normals)
             normals(instance->seed, task->stream, (uint64_t)(tick / every), task->normals, z);

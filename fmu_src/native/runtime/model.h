@@ -18,7 +18,7 @@ typedef void Routine(double *v, const double *z);
 /* Reads an instance's numbers and answers. */
 typedef void Query(const double *v, double *answer);
 
-typedef enum { REAL, INTEGER, BOOLEAN, ENUMERATION } Type;
+typedef enum { REAL, INTEGER, BOOLEAN, ENUMERATION, HIDDEN } Type;
 
 typedef struct {
     const char *name;
@@ -51,7 +51,7 @@ typedef struct {
     int first_way, ways;
 } Task;
 
-/* One step of a task, for one value of the parameter that chooses. */
+/* One step of a task, for one value of the parameter that chooses; at other values the task rests. */
 typedef struct {
     double value;
     Routine *step;
