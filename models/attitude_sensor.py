@@ -31,8 +31,11 @@ from .attitude.velocity_aided import Fused, FusionParameters, FusionState, RestS
 from .filters.kalman import KalmanParameters, kalman_filtered
 from .filters.rc import RcParameters, rc_filtered
 from .record import Boolean, Enumeration, Integer, Item, Matrix3, Quaternion, Real, Vector3, choose
-from .scalar import PI, Scalar, both, maximum, minimum, sqrt, where
+from .scalar import PI, Scalar, both, floor, maximum, minimum, sqrt, where
 from .sensors import accelerometer as accelerometers
+from .sensors import adis16354_words as adis16354
+from .sensors import adxl355_registers as adxl355
+from .sensors import adxrs450_frame as adxrs450
 from .sensors import bias_instability, devices
 from .sensors import gyro as gyros
 from .sensors.accelerometer import (
@@ -41,9 +44,9 @@ from .sensors.accelerometer import (
     AccelerometerParameters,
     AccelerometerState,
 )
-from .sensors.gyro import GYRO_FILTER, GyroCoefficients, GyroParameters, GyroState
 from .sensors.digital_filter import TAPS, DelayLines
 from .sensors.faults import FAULT, FaultParameters, is_active
+from .sensors.gyro import GYRO_FILTER, GyroCoefficients, GyroParameters, GyroState
 from .sensors.sensitivity import hysteresis_loop, hysteresis_offset, with_temperature
 from .sensors.thermal import (
     HeaterParameters,
@@ -231,6 +234,7 @@ class SlowState(NamedTuple):
     accelerometer_loop: Annotated[float, Real("K", "hysteresis loop of the accelerometer", display="degC")]
     gyro_offset: Annotated[Vector3, Real("rad/s", "all that the gyros read too much at rest", display="deg/s")]
     accelerometer_offset: Annotated[Vector3, Real("m/s2", "all that the accelerometer reads too much")]
+    supply_voltage: Annotated[float, Real("V", "voltage that feeds the parts")]
     gyro_scale: Annotated[Vector3, Real("1", "sensitivity of the gyros over that at 25 degC")]
     accelerometer_scale: Annotated[Vector3, Real("1", "sensitivity of the accelerometer over that at 25 degC")]
 
@@ -280,10 +284,26 @@ class State(NamedTuple):
 
 
 class RegisterOutputs(NamedTuple):
-    """Codes in the parts' registers."""
+    """Codes in the parts' registers, and the words that carry them to the processor."""
 
     rate: Annotated[Vector3, Integer("RATE registers of the three gyros")]
     acceleration: Annotated[Vector3, Integer("XDATA, YDATA, ZDATA of the accelerometer")]
+    gyro_temperature: Annotated[float, Integer("code of the gyros' thermometer")]
+    accelerometer_temperature: Annotated[float, Integer("code of the accelerometer's thermometer")]
+    gyro_word: Annotated[
+        Vector3, Integer("what a read of the gyro answers: ADXRS450 32-bit response as signed, ADIS16354 16-bit word")
+    ]
+    accelerometer_word: Annotated[
+        Vector3, Integer("what a read of the accelerometer answers: ADXL355 24-bit, ADIS16354 16-bit word")
+    ]
+    status_word: Annotated[float, Integer("STATUS of an ADIS16354, 0 for the other parts")]
+
+
+class SampleOutputs(NamedTuple):
+    """What the beat between the parts' clocks and the processor's does, counted over all parts."""
+
+    repeated: Annotated[float, Integer("words that the processor read more than once")]
+    missed: Annotated[float, Integer("words that the processor never read")]
 
 
 class DieTemperatureOutputs(NamedTuple):
@@ -303,6 +323,7 @@ class Outputs(NamedTuple):
     gyro_bias: Annotated[Vector3, Real("rad/s", "gyro bias as estimated", display="deg/s")]
     specific_force_measured: Annotated[Vector3, Real("m/s2", "specific force as read")]
     register: RegisterOutputs
+    sample: SampleOutputs
     die_temperature: DieTemperatureOutputs
     aligned: Annotated[bool, Boolean("alignment has ended, attitude valid")]
     status: Annotated[int, STATUS]
@@ -375,6 +396,7 @@ def _initial_slow(p: Parameters, inputs: Inputs) -> SlowState:
         part_temperature,
         gyro.offset,
         part.offset,
+        inputs.supply_voltage,
         gyro.scale,
         part.scale,
     )
@@ -578,6 +600,7 @@ def slow_step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, draw
         part_loop,
         add(gyro.offset, _total(gyro_wander)),
         add(part.offset, _total(part_wander)),
+        inputs.supply_voltage,
         gyro.scale,
         part.scale,
     )
@@ -773,7 +796,72 @@ def _kalman(before: Euler, variance: Vector3, solved: Euler, p: FilterParameters
     return Euler(*[y for y, _ in pairs]), each_axis(lambda i: pairs[i][1])
 
 
-def outputs(state: State, _p: Parameters, _k: Coefficients) -> Outputs:
+def _words_of_gyro(axis: int, state: State, p: Parameters, status: Scalar) -> Scalar:
+    """The answer of one gyro: a sensor data response (ADXRS450) or an output word (ADIS16354)."""
+    gyro = state.gyro[axis]
+    checking = where(p.gyro.self_test > 0.5, 1.0, 0.0)
+    lost = where(gyro.condition > 1.5, 1.0, 0.0)
+    worn = where(gyro.condition > 0.5, 1.0, 0.0)
+    faults = adxrs450.FaultBits(
+        phase_lock=maximum(lost, checking),
+        quadrature=checking,
+        memory=checking,
+        power_on_reset=checking,
+        power=checking,
+        self_test=maximum(worn, checking),
+        check=checking,
+    )
+    turns = state.reading.readings
+    sequence = turns - 8.0 * floor(turns / 8.0)
+    response = adxrs450.sensor_data_response(gyro.code, sequence, adxrs450.data_status(checking, lost), faults)
+    fresh = where(gyro.words > state.reading.gyro_words[axis], 1.0, 0.0)
+    word = adis16354.output_word(gyro.code, fresh, adis16354.error_or_alarm(status))
+    return where(p.gyro.filter == GYRO_FILTER.value("cic"), adxrs450.as_int32(response), word)
+
+
+def _status_word(state: State, p: Parameters) -> Scalar:
+    """STATUS of an ADIS16354: self-test failures of stuck or silent channels, range, supply."""
+    gyro = [where(one.condition > 0.5, 1.0, 0.0) for one in state.gyro]
+    part = [where(one > 0.5, 1.0, 0.0) for one in state.accelerometer.condition]
+    failed = maximum(maximum(maximum(gyro[0], gyro[1]), gyro[2]), maximum(maximum(part[0], part[1]), part[2]))
+    beyond = maximum(
+        maximum(state.gyro[0].over_range, state.gyro[1].over_range),
+        maximum(state.gyro[2].over_range, state.accelerometer.over_range),
+    )
+    volts = state.slow.supply_voltage
+    status = adis16354.Status(
+        *reversed(part),
+        *reversed(gyro),
+        self_test=failed,
+        over_range=beyond,
+        supply_high=where(volts > 5.25, 1.0, 0.0),
+        supply_low=where(volts < 4.75, 1.0, 0.0),
+    )
+    return where(p.gyro.filter == GYRO_FILTER.value("cic"), 0.0, adis16354.status_word(status))
+
+
+def _registers(state: State, p: Parameters) -> RegisterOutputs:
+    status = _status_word(state, p)
+    part = state.accelerometer
+    fresh = where(part.words > state.reading.accelerometer_words, 1.0, 0.0)
+    error = adis16354.error_or_alarm(status)
+    decimates = p.accelerometer.filter == ACCELEROMETER_FILTER.value("decimator")
+    return RegisterOutputs(
+        (state.gyro[0].code, state.gyro[1].code, state.gyro[2].code),
+        part.code,
+        thermometer_code(p.gyro.thermometer, state.slow.gyro_temperature),
+        thermometer_code(p.accelerometer.thermometer, state.slow.accelerometer_temperature),
+        each_axis(lambda i: _words_of_gyro(i, state, p, status)),
+        each_axis(
+            lambda i: where(
+                decimates, adxl355.data_word(part.code[i]), adis16354.output_word(part.code[i], fresh, error)
+            )
+        ),
+        status,
+    )
+
+
+def outputs(state: State, p: Parameters, _k: Coefficients) -> Outputs:
     """Angles, signals as read and registers, as they stand after the last reading."""
     attitude, reading = state.attitude, state.reading
     beyond = maximum(
@@ -787,9 +875,8 @@ def outputs(state: State, _p: Parameters, _k: Coefficients) -> Outputs:
         rate_corrected=subtract(reading.rate, attitude.bias),
         gyro_bias=attitude.bias,
         specific_force_measured=reading.specific_force,
-        register=RegisterOutputs(
-            (state.gyro[0].code, state.gyro[1].code, state.gyro[2].code), state.accelerometer.code
-        ),
+        register=_registers(state, p),
+        sample=SampleOutputs(reading.repeated, reading.missed),
         die_temperature=DieTemperatureOutputs(state.slow.gyro_temperature, state.slow.accelerometer_temperature),
         aligned=attitude.aligned > 0.5,
         status=where(

@@ -129,18 +129,21 @@ def with_watched_sample(
     n, f, w = watched.sums
     share = 1.0 / maximum(n, 1.0)
     mean_force, mean_rate = scale(share, f), scale(share, w)
-    # a plain mean until the memory is full: the first sample must not weigh more than the others
-    gain = maximum(1.0 / (n + 1.0), 1.0 - exp(-h / p.memory))
+    sums = with_sample(watched.sums, force, rate)
+    # a plain mean, that of the sums, until the memory is full: a few samples scatter too much to tell of motion
+    gain = maximum(1.0 / sums.samples, 1.0 - exp(-h / p.memory))
     force_lately = add(watched.specific_force_lately, scale(gain, subtract(force, watched.specific_force_lately)))
     rate_lately = add(watched.rate_lately, scale(gain, subtract(rate, watched.rate_lately)))
-    pushed, turned = subtract(force_lately, mean_force), subtract(rate_lately, mean_rate)
+    whole = 1.0 / sums.samples
+    pushed = subtract(force_lately, scale(whole, sums.specific_force))
+    turned = subtract(rate_lately, scale(whole, sums.rate))
     beyond = either(
         dot(pushed, pushed) > p.specific_force * p.specific_force,
         dot(turned, turned) > p.rate * p.rate,
     )
-    moved = both(both(p.restart > 0.5, n > 0.5), beyond)
+    moved = both(p.restart > 0.5, beyond)
     going_on = WatchedAlignment(
-        with_sample(watched.sums, force, rate),
+        sums,
         _scatter(watched.rate_squares, subtract(rate, mean_rate), n),
         _scatter(watched.specific_force_squares, subtract(force, mean_force), n),
         rate_lately,

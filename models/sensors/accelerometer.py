@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 from ..record import Boolean, Enumeration, Integer, Item, Matrix3, Real, Vector3, choose
-from ..scalar import PI, Scalar, absolute, both, clip, exp, floor, maximum, minimum, where
+from ..scalar import PI, Scalar, absolute, clip, exp, floor, maximum, minimum, where
 from ..system import STOPPED
 from ..vectors import ZERO3, add, cross, dot, each_axis, multiply, scale
 from . import devices
@@ -34,7 +34,7 @@ from .digital_filter import (
     sinc2_decimated,
     taps_of,
 )
-from .faults import FaultParameters, faulted
+from .faults import FaultParameters, condition_of, faulted
 from .quantiser import over_range, register_code
 from .sensitivity import bent, cubic_gains, sensitivity_matrix
 from .thermal import ThermalParameters, ThermometerParameters
@@ -192,7 +192,7 @@ class AccelerometerState(NamedTuple):
     pending: Annotated[Vector3, Integer("code on its way to the registers")]
     code: Annotated[Vector3, Integer("data registers")]
     over_range: Annotated[float, Boolean("a reading beyond the range")]
-    invalid: Annotated[Vector3, Boolean("the word holds no valid reading")]
+    condition: Annotated[Vector3, Integer("0 well, 1 stuck, 2 without a valid reading")]
 
 
 def _chosen(choice: Scalar, values: tuple[float, ...]) -> Scalar:
@@ -212,7 +212,7 @@ def accelerometer_coefficients(
     frequency = full / where(decimates, 1.0, 1.0 * part.divider)
     choice = part.output_data_rate
     decimation = where(decimates, _chosen(choice, tuple(2.0**i for i in range(len(_DELAYS)))), 1.0)
-    # the sinc^2 itself delays by R - 1 samples; whole samples of the rest are latency, the first stage does what is left
+    # the sinc^2 itself delays by R - 1 samples; of the rest whole ones are latency, the first stage does what is left
     rest = _chosen(choice, tuple(delay.si * _SHEET.sampling_frequency.si for delay in _DELAYS)) - (decimation - 1.0)
     latency = minimum(maximum(floor(rest - 1.0 + 1e-9), 1.0), decimation)
     corner = _chosen(part.high_pass, (0.0, *[corner.value for corner in devices.ADXL355_HIGH_PASS]))
@@ -252,7 +252,7 @@ def _sensed(force: Vector3, factor: Vector3, p: AccelerometerParameters, k: Acce
 class _Words(NamedTuple):
     code: Vector3
     over_range: Scalar
-    invalid: Vector3
+    condition: Vector3
 
 
 def _words(
@@ -264,7 +264,7 @@ def _words(
     draws: tuple[Scalar, ...],
 ) -> _Words:
     """Register words of these readings, under faults."""
-    codes, beyond, invalid = [], [], []
+    codes, beyond, condition = [], [], []
     for axis in range(3):
         value = values[axis] + where(p.self_test > 0.5, p.self_test_response[axis], 0.0)
         stuck: Scalar = 0.0
@@ -275,11 +275,11 @@ def _words(
         fresh = register_code(value, p.range, p.resolution, p.code_limit)
         codes.append(where(dropped > 0.5, 0.0, where(stuck > 0.5, before[axis], fresh)))
         beyond.append(over_range(value, p.range))
-        invalid.append(where(dropped > 0.5, 1.0, 0.0))
+        condition.append(condition_of(stuck, dropped))
     return _Words(
         (codes[0], codes[1], codes[2]),
         maximum(maximum(beyond[0], beyond[1]), beyond[2]),
-        (invalid[0], invalid[1], invalid[2]),
+        (condition[0], condition[1], condition[2]),
     )
 
 
@@ -356,7 +356,7 @@ def sense(
         pending,
         (where(due, pending[0], code[0]), where(due, pending[1], code[1]), where(due, pending[2], code[2])),
         state.over_range,
-        state.invalid,
+        state.condition,
     )
 
 
@@ -399,7 +399,7 @@ def register(
         words.code,
         state.code,
         words.over_range,
-        words.invalid,
+        words.condition,
     )
 
 
@@ -446,7 +446,7 @@ def sample(taps: int) -> Callable[..., tuple[AccelerometerState, tuple[DelayLine
             words.code,
             words.code,
             words.over_range,
-            words.invalid,
+            words.condition,
         )
         return part, (after[0], after[1], after[2])
 

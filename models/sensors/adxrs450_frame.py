@@ -38,7 +38,7 @@ _TEMPERATURE_ZERO = 45.0  # degC at 0 LSB, Rev. 0 Table 1
 _TEMPERATURE_SENSITIVITY = 5.0  # LSB/degC, Rev. 0 Table 1
 
 
-class Faults(NamedTuple):
+class FaultBits(NamedTuple):
     """Fault bits, each 0 or 1, in the order of the FAULT register's bits 11 to 1 (Rev. 0; Linux adxrs450.c agrees)."""
 
     fail: Annotated[float, Boolean("FAIL: a failure that sets the status to 00")] = 0.0
@@ -54,10 +54,10 @@ class Faults(NamedTuple):
     check: Annotated[float, Boolean("CHK: faults made on command")] = 0.0
 
 
-NO_FAULTS = Faults()
-ALL_FAULTS = Faults(*(1.0,) * len(NO_FAULTS))
+NO_FAULTS = FaultBits()
+ALL_FAULTS = FaultBits(*(1.0,) * len(NO_FAULTS))
 _REGISTER_MARK = float(0b1110 << 8)  # bits 27..24 of every answer but sensor data; the first two are the status 11
-_FIRST_IN_FRAME = Faults._fields.index("phase_lock")
+_FIRST_IN_FRAME = FaultBits._fields.index("phase_lock")
 
 
 class RequestErrors(NamedTuple):
@@ -73,12 +73,12 @@ def as_int32(frame: Scalar) -> Scalar:
     return signed(frame, 32)
 
 
-def fault_word(faults: Faults) -> Scalar:
-    """FAULT register word (0x0A): 11 FAIL, 10 AMP, 9 OV, 8 UV, 7 PLL, 6 Q, 5 NVM, 4 POR, 3 PWR, 2 CST, 1 CHK (Rev. 0)."""
+def fault_word(faults: FaultBits) -> Scalar:
+    """FAULT word (0x0A): 11 FAIL, 10 AMP, 9 OV, 8 UV, 7 PLL, 6 Q, 5 NVM, 4 POR, 3 PWR, 2 CST, 1 CHK (Rev. 0)."""
     return 2.0 * flags(faults)
 
 
-def fault_byte(faults: Faults) -> Scalar:
+def fault_byte(faults: FaultBits) -> Scalar:
     """Fault bits that every sensor data response carries: bits 7 PLL to 1 CHK."""
     return 2.0 * flags(faults[_FIRST_IN_FRAME:])
 
@@ -119,7 +119,7 @@ def _framed(upper: Scalar, lower: Scalar, lower_ones: Scalar) -> Scalar:
     return 2.0**16 * (upper + 2.0**12 * p0) + (lower + p1)
 
 
-def sensor_data_response(code: Scalar, sequence: Scalar, status: Scalar, faults: Faults) -> Scalar:
+def sensor_data_response(code: Scalar, sequence: Scalar, status: Scalar, faults: FaultBits) -> Scalar:
     """Response to a sensor data command, 0 .. 2^32 - 1.
 
     31..29 SQ2..0, 28 P0, 27..26 ST1..0, 25..10 rate code (two's complement, 80 LSB/(deg/s)), 9..8 zero, 7 PLL, 6 Q,
@@ -156,7 +156,7 @@ def write_response(data: Scalar) -> Scalar:
     return _register_response(1.0, data)
 
 
-def error_response(errors: RequestErrors, faults: Faults) -> Scalar:
+def error_response(errors: RequestErrors, faults: FaultBits) -> Scalar:
     """Response to a refused read or write.
 
     31..29 000, 28 P0, 27..24 1110, 23..21 zero, 20..19 zero, 18 SPI, 17 RE, 16 DU, 15..8 undefined (zero here), 7..1
@@ -210,7 +210,7 @@ class SensorData(NamedTuple):
     sequence: int
     status: int
     code: int
-    faults: Faults
+    faults: FaultBits
     parity_holds: bool
 
 
@@ -220,7 +220,7 @@ class RegisterAnswer(NamedTuple):
     kind: str
     data: int
     errors: RequestErrors
-    faults: Faults
+    faults: FaultBits
     parity_holds: bool
 
 
@@ -239,9 +239,9 @@ def _parities_hold(frame: int) -> bool:
     return (frame >> 16).bit_count() % 2 == 1 and frame.bit_count() % 2 == 1
 
 
-def _decode_faults(frame: int) -> Faults:
-    names = Faults._fields[_FIRST_IN_FRAME:]
-    return Faults(**{name: float(frame >> bit & 1) for name, bit in zip(names, range(7, 0, -1), strict=True)})
+def _decode_faults(frame: int) -> FaultBits:
+    names = FaultBits._fields[_FIRST_IN_FRAME:]
+    return FaultBits(**{name: float(frame >> bit & 1) for name, bit in zip(names, range(7, 0, -1), strict=True)})
 
 
 def decode_sensor_data(frame: int) -> SensorData:

@@ -48,11 +48,16 @@ class FaultParameters(NamedTuple):
 
 
 class Faulted(NamedTuple):
-    """What a fault makes of a channel's reading: the reading, 1.0 where it keeps the old word, 1.0 where it has none."""
+    """What a fault makes of a reading: the reading, 1.0 where the old word stays, 1.0 where there is none."""
 
     value: Scalar
     stuck: Scalar
     dropped: Scalar
+
+
+def condition_of(stuck: Scalar, dropped: Scalar) -> Scalar:
+    """0 well, 1 stuck, 2 without a valid reading."""
+    return where(dropped > 0.5, 2.0, where(stuck > 0.5, 1.0, 0.0))
 
 
 def is_active(fault: FaultParameters, channel: int, time: Scalar) -> Scalar:

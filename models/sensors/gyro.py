@@ -35,7 +35,7 @@ from .digital_filter import (
     taps_of,
     with_samples,
 )
-from .faults import FaultParameters, faulted
+from .faults import FaultParameters, condition_of, faulted
 from .quantiser import over_range, register_code
 from .sensitivity import bent, cubic_gains, sensitivity_matrix
 from .thermal import ThermalParameters, ThermometerParameters
@@ -200,7 +200,7 @@ class GyroState(NamedTuple):
     null: NullState
     code: Annotated[float, Integer("rate register")]
     over_range: Annotated[float, Boolean("reading beyond the range")]
-    invalid: Annotated[float, Boolean("the word holds no valid reading")]
+    condition: Annotated[float, Integer("0 well, 1 stuck, 2 without a valid reading")]
 
 
 def gyro_coefficients(gyro: GyroParameters, mounting: Matrix3, ideal: Any) -> GyroCoefficients:
@@ -255,7 +255,7 @@ def _word(
     faults: tuple[FaultParameters, ...],
     draw: Scalar,
 ) -> tuple[Scalar, ...]:
-    """Words so far, bias null, code, over-range and invalid after one more word of this value."""
+    """Words so far, bias null, code, over-range and condition after one more word of this value."""
     words = gyro.words + 1.0
     time = words * k.word_period[axis]
     value = value + offset + where(p.self_test > 0.5, p.self_test_response[axis], 0.0)
@@ -268,7 +268,7 @@ def _word(
     null = nulled(gyro.null, fresh, words, axis, p, k)
     code = clip(fresh + null.offset, -p.code_limit, p.code_limit - 1.0)
     code = where(dropped > 0.5, 0.0, where(stuck > 0.5, gyro.code, code))
-    return words, null, code, over_range(value, p.range), where(dropped > 0.5, 1.0, 0.0)
+    return words, null, code, over_range(value, p.range), condition_of(stuck, dropped)
 
 
 def nulled(
@@ -344,8 +344,8 @@ def register(axis: int) -> Register:
         jitter = (mean - gyro.mean) / k.word_period[axis] * (p.clock_jitter * draws[2])
         noise_a, noise_b = block_sums(k.sample_deviation[axis], n, draws[0], draws[1])
         y, windows = sinc2_overlapped(gyro.windows, gyro.block.a + noise_a, gyro.block.b + noise_b, n)
-        words, null, code, beyond, invalid = _word(axis, gyro, y + jitter, offset, p, k, faults, draws[3])
-        return GyroState(gyro.rate, gyro.sensed, EMPTY, windows, mean, gyro.sums, words, null, code, beyond, invalid)
+        words, null, code, beyond, condition = _word(axis, gyro, y + jitter, offset, p, k, faults, draws[3])
+        return GyroState(gyro.rate, gyro.sensed, EMPTY, windows, mean, gyro.sums, words, null, code, beyond, condition)
 
     return step
 
@@ -374,8 +374,10 @@ def sample(axis: int, taps: int) -> Sample:
         limited = clip(noisy, -2.0 * p.range, 2.0 * p.range)
         y, sums, after = bartlett(gyro.sums, lines, converted(limited, p.resolution), taps)
         value = y * (p.resolution / CONVERTER_STEPS)
-        words, null, code, beyond, invalid = _word(axis, gyro, value, 0.0, p, k, faults, draws[3])
-        state = GyroState(passed, sensed, gyro.block, gyro.windows, gyro.mean, sums, words, null, code, beyond, invalid)
+        words, null, code, beyond, condition = _word(axis, gyro, value, 0.0, p, k, faults, draws[3])
+        state = GyroState(
+            passed, sensed, gyro.block, gyro.windows, gyro.mean, sums, words, null, code, beyond, condition
+        )
         return state, after
 
     return step

@@ -1,4 +1,4 @@
-"""What a part makes of the true signal: scale, cross-axis, misalignment, non-orthogonality, nonlinearity, temperature."""
+"""What a part makes of the true signal: scale, axes, nonlinearity, temperature."""
 
 from __future__ import annotations
 

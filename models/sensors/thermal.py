@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from ..record import Boolean, Real
-from ..scalar import Scalar, clip, exp, round_half_up, where
+from ..scalar import Scalar, absolute, clip, exp, round_half_up, where
 
 
 class ThermalParameters(NamedTuple):
@@ -80,5 +80,6 @@ def thermometer_code(thermometer: ThermometerParameters, temperature: Scalar) ->
 
 
 def thermometer_reading(thermometer: ThermometerParameters, code: Scalar) -> Scalar:
-    """The temperature (K) that a processor makes of the code."""
-    return 298.15 + (code - thermometer.code_at_25) / thermometer.sensitivity
+    """The temperature (K) that a processor makes of the code; 25 degC where the thermometer has no sensitivity."""
+    fitted = absolute(thermometer.sensitivity) > 1e-9
+    return 298.15 + where(fitted, (code - thermometer.code_at_25) / where(fitted, thermometer.sensitivity, 1.0), 0.0)
