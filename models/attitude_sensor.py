@@ -10,14 +10,16 @@ from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 from .attitude.alignment import (
+    NOTHING_SEEN,
     AlignmentParameters,
-    AlignmentState,
+    MotionParameters,
+    WatchedAlignment,
     levelled,
     nulled_bias,
     samples_for,
-    with_sample,
+    with_watched_sample,
 )
-from .attitude.integration import runge_kutta_4
+from .attitude.integration import INTEGRATION, INTEGRATORS, Integrator
 from .attitude.rotations import (
     REFERENCE_LATITUDE,
     STANDARD_GRAVITY,
@@ -28,6 +30,7 @@ from .attitude.rotations import (
     matrix_from_quaternion,
 )
 from .attitude.velocity_aided import Fused, FusionParameters, FusionState, RestState, fused_step, initial_fusion
+from .filters.ar1_kalman import Ar1KalmanParameters, Ar1KalmanState, ar1_kalman_step, initial_ar1_kalman
 from .filters.kalman import KalmanParameters, kalman_filtered
 from .filters.rc import RcParameters, rc_filtered
 from .record import Boolean, Enumeration, Integer, Item, Matrix3, Quaternion, Real, Vector3, choose
@@ -140,10 +143,28 @@ class CompensationParameters(NamedTuple):
     accelerometer_matrix: Annotated[Matrix3, Real("1", "what the accelerometer readings are multiplied by")] = IDENTITY3
 
 
+SIGNAL_FILTER = Enumeration(
+    "SignalFilter",
+    (
+        Item("none", "signals as read"),
+        Item("ar1_kalman", "Kalman filter on AR(1) noise, each of the six channels"),
+    ),
+    "filter on the readings before the solver",
+)
+
+
+class SignalFilterParameters(NamedTuple):
+    """The filter on the readings."""
+
+    kind: Annotated[int, SIGNAL_FILTER] = SIGNAL_FILTER.value("none")
+    ar1: Ar1KalmanParameters = Ar1KalmanParameters()
+
+
 class SolverParameters(NamedTuple):
     """The attitude solution."""
 
     kind: Annotated[int, SOLVER] = SOLVER.value("fused")
+    integration: Annotated[int, INTEGRATION] = INTEGRATION.value("runge_kutta_4")
     fusion: FusionParameters = FusionParameters()
 
 
@@ -174,6 +195,8 @@ class Parameters(NamedTuple):
     compensation: CompensationParameters = CompensationParameters()
     processor: ProcessorParameters = ProcessorParameters()
     alignment: AlignmentParameters = AlignmentParameters()
+    motion: MotionParameters = MotionParameters()
+    signal_filter: SignalFilterParameters = SignalFilterParameters()
     solver: SolverParameters = SolverParameters()
     filter: FilterParameters = FilterParameters()
 
@@ -255,7 +278,7 @@ class AttitudeState(NamedTuple):
     """The attitude solution."""
 
     aligned: Annotated[float, Boolean("the alignment has ended")]
-    alignment: AlignmentState
+    alignment: WatchedAlignment
     q_nb: Annotated[Quaternion, Real("1", "attitude, body to navigation")]
     rate_before: Annotated[Vector3, Real("rad/s", "rate of the reading before", display="deg/s")]
     bias: Annotated[Vector3, Real("rad/s", "gyro bias as estimated", display="deg/s")]
@@ -277,6 +300,7 @@ class State(NamedTuple):
     accelerometer: AccelerometerState
     slow: SlowState
     reading: ReadingState
+    signal: Ar1KalmanState
     attitude: AttitudeState
     filter: FilterState
     gyro_lines: tuple[DelayLines, DelayLines, DelayLines]
@@ -425,9 +449,10 @@ def initial_state(p: Parameters, k: Coefficients, inputs: Inputs) -> State:
         accelerometer=part,
         slow=slow,
         reading=reading,
+        signal=initial_ar1_kalman(reading.rate, reading.specific_force, p.signal_filter.ar1),
         attitude=AttitudeState(
             aligned=0.0,
-            alignment=AlignmentState(0.0, ZERO3, ZERO3),
+            alignment=NOTHING_SEEN,
             q_nb=q_nb,
             rate_before=reading.rate,
             bias=ZERO3,
@@ -667,7 +692,7 @@ def _lost(channel: int, p: Parameters, time: Scalar) -> Scalar:
 def acquire(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
     """The processor's timer fires: the registers are read; words are counted that come twice or not at all."""
     before = state.reading
-    attitude = state.attitude._replace(rate_before=before.rate)
+    attitude = state.attitude._replace(rate_before=state.signal.rate.estimate)
     read = _read(state.gyro, state.accelerometer, state.slow, inputs, p, k)
     readings = before.readings + 1.0
     time = readings * k.processor_period
@@ -687,7 +712,22 @@ def acquire(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws
         minimum(missed, _MOST_COUNTED),
         readings,
     )
-    return State(state.gyro, state.accelerometer, state.slow, reading, attitude, *state[5:])
+    return State(*state[:3], reading, state.signal, attitude, *state[6:])
+
+
+def _signals_as_read(state: State, _inputs: Inputs, _p: Parameters, _k: Coefficients, _draws: tuple[Any, ...]) -> State:
+    rate, force = state.reading.rate, state.reading.specific_force
+    signal = Ar1KalmanState(
+        state.signal.rate._replace(estimate=rate, reading=rate),
+        state.signal.specific_force._replace(estimate=force, reading=force),
+    )
+    return State(*state[:4], signal, *state[5:])
+
+
+def _signals_filtered(state: State, _inputs: Inputs, p: Parameters, _k: Coefficients, _draws: tuple[Any, ...]) -> State:
+    reading = state.reading
+    signal = ar1_kalman_step(state.signal, reading.rate, reading.specific_force, p.signal_filter.ar1)
+    return State(*state[:4], signal, *state[5:])
 
 
 class _Start(NamedTuple):
@@ -696,14 +736,17 @@ class _Start(NamedTuple):
     q_nb: Quaternion
     bias: Vector3
     fusion: FusionState
-    alignment: AlignmentState
+    alignment: WatchedAlignment
 
 
 def _aligning(
     attitude: AttitudeState, reading: ReadingState, inputs: Inputs, p: Parameters, k: Coefficients
 ) -> tuple[_Start, Scalar]:
     """The start of the solution after one more reading at rest, and 1.0 once there are enough."""
-    alignment = with_sample(attitude.alignment, reading.specific_force, reading.rate)
+    watched = with_watched_sample(
+        attitude.alignment, reading.specific_force, reading.rate, p.motion, p.processor.period
+    )
+    alignment = watched.sums
     q_nb = levelled(alignment.specific_force, inputs.heading_aid)
     done = where(alignment.samples > k.alignment_samples - 0.5, 1.0, 0.0)
     nulled, found = nulled_bias(alignment, q_nb, p.latitude, p.alignment)
@@ -717,53 +760,77 @@ def _aligning(
         where(found > 0.5, 0.0, 3.0 * fusion.initial_bias),
         rest,
     )
-    return _Start(q_nb, choose(done > 0.5, nulled, ZERO3), fused, alignment), done
+    return _Start(q_nb, choose(done > 0.5, nulled, ZERO3), fused, watched), done
 
 
 Solution = tuple[Quaternion, Vector3, FusionState]
+Solver = Callable[[AttitudeState, _Read, Parameters], Solution]
 
 
-def _integrated(attitude: AttitudeState, reading: ReadingState, p: Parameters) -> Quaternion:
+def _integrated(attitude: AttitudeState, signal: _Read, p: Parameters, integrate: Integrator) -> Quaternion:
     earth = multiply_transposed(matrix_from_quaternion(attitude.q_nb), earth_rate_n(p.latitude))
     known = add(attitude.bias, earth)
-    return runge_kutta_4(
-        attitude.q_nb, subtract(attitude.rate_before, known), subtract(reading.rate, known), p.processor.period
-    )
+    before, now = subtract(attitude.rate_before, known), subtract(signal.rate, known)
+    return integrate(attitude.q_nb, before, now, p.processor.period)
 
 
-def _levelling(attitude: AttitudeState, reading: ReadingState, p: Parameters) -> Solution:
-    yaw = euler_from_matrix(matrix_from_quaternion(_integrated(attitude, reading, p))).yaw
-    return levelled(reading.specific_force, yaw), attitude.bias, attitude.fusion
+def _levelling(integrate: Integrator) -> Solver:
+    def solved(attitude: AttitudeState, signal: _Read, p: Parameters) -> Solution:
+        yaw = euler_from_matrix(matrix_from_quaternion(_integrated(attitude, signal, p, integrate))).yaw
+        return levelled(signal.specific_force, yaw), attitude.bias, attitude.fusion
+
+    return solved
 
 
-def _gyro_only(attitude: AttitudeState, reading: ReadingState, p: Parameters) -> Solution:
-    return _integrated(attitude, reading, p), attitude.bias, attitude.fusion
+def _gyro_only(integrate: Integrator) -> Solver:
+    def solved(attitude: AttitudeState, signal: _Read, p: Parameters) -> Solution:
+        return _integrated(attitude, signal, p, integrate), attitude.bias, attitude.fusion
+
+    return solved
 
 
-def _fused(attitude: AttitudeState, reading: ReadingState, p: Parameters) -> Solution:
+def _fused(attitude: AttitudeState, signal: _Read, p: Parameters) -> Solution:
     before = Fused(attitude.q_nb, attitude.bias, attitude.fusion)
     return fused_step(
         before,
-        reading.rate,
-        reading.specific_force,
+        signal.rate,
+        signal.specific_force,
         p.solver.fusion,
         p.latitude,
         p.processor.period,
     )
 
 
-def _solver(running: Callable[[AttitudeState, ReadingState, Parameters], Solution]) -> TaskStep:
+def _solver(running: Solver) -> TaskStep:
     def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
-        attitude, reading = state.attitude, state.reading
-        start, done = _aligning(attitude, reading, inputs, p, k)
+        attitude = state.attitude
+        start, done = _aligning(attitude, state.reading, inputs, p, k)
         aligned = attitude.aligned > 0.5
-        now = choose(aligned, _Start(*running(attitude, reading, p), attitude.alignment), start)
+        signal = _Read(state.signal.rate.estimate, state.signal.specific_force.estimate)
+        now = choose(aligned, _Start(*running(attitude, signal, p), attitude.alignment), start)
         solved = AttitudeState(
             where(aligned, 1.0, done), now.alignment, now.q_nb, attitude.rate_before, now.bias, now.fusion
         )
-        return State(state.gyro, state.accelerometer, state.slow, reading, solved, *state[5:])
+        return State(*state[:5], solved, *state[6:])
 
     return step
+
+
+_FUSED_WAY = 0
+"""The fused solver integrates in a way of its own."""
+
+
+def _solver_ways() -> dict[int, TaskStep]:
+    """A step for each solver, and for each integration where it has a choice."""
+    ways = {_FUSED_WAY: _solver(_fused)}
+    for kind, solver in (("levelling", _levelling), ("gyro", _gyro_only)):
+        for number, integrate in INTEGRATORS.items():
+            ways[_solver_way(SOLVER.value(kind), number)] = _solver(solver(integrate))
+    return ways
+
+
+def _solver_way(kind: Scalar, integration: Scalar) -> Scalar:
+    return 10 * kind + integration
 
 
 def _filter(
@@ -775,7 +842,7 @@ def _filter(
         begun = before.started > 0.5
         start = Euler(*[where(begun, y, angle) for y, angle in zip(before.euler, solved, strict=True)])
         euler, variance = filtered(start, before.variance, solved, p.filter)
-        return State(*state[:5], FilterState(1.0, euler, variance), *state[6:])
+        return State(*state[:6], FilterState(1.0, euler, variance), *state[7:])
 
     return step
 
@@ -830,8 +897,12 @@ def _status_word(state: State, p: Parameters) -> Scalar:
     )
     volts = state.slow.supply_voltage
     status = adis16354.Status(
-        *reversed(part),
-        *reversed(gyro),
+        z_acceleration=part[2],
+        y_acceleration=part[1],
+        x_acceleration=part[0],
+        z_gyro=gyro[2],
+        y_gyro=gyro[1],
+        x_gyro=gyro[0],
         self_test=failed,
         over_range=beyond,
         supply_high=where(volts > 5.25, 1.0, 0.0),
@@ -994,14 +1065,21 @@ MODEL = Model(
         ),
         Task("acquire", "processor", acquire),
         Task(
-            "solve",
+            "signal_filter",
             "processor",
             {
-                SOLVER.value("levelling"): _solver(_levelling),
-                SOLVER.value("gyro"): _solver(_gyro_only),
-                SOLVER.value("fused"): _solver(_fused),
+                SIGNAL_FILTER.value("none"): _signals_as_read,
+                SIGNAL_FILTER.value("ar1_kalman"): _signals_filtered,
             },
-            choice=lambda p: p.solver.kind,
+            choice=lambda p: p.signal_filter.kind,
+        ),
+        Task(
+            "solve",
+            "processor",
+            _solver_ways(),
+            choice=lambda p: where(
+                p.solver.kind == SOLVER.value("fused"), _FUSED_WAY, _solver_way(p.solver.kind, p.solver.integration)
+            ),
         ),
         Task(
             "filter",

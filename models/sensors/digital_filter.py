@@ -11,7 +11,7 @@ numbers, so that they stay exact.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from ..record import Integer, Item, Real, Vector3
 from ..scalar import Scalar, round_half_up, where
@@ -87,7 +87,10 @@ def converted(value: Scalar, resolution: Scalar) -> Scalar:
     return round_half_up(value * (CONVERTER_STEPS / resolution))
 
 
-Line: Any = tuple[(float,) * MOST_TAPS]
+if TYPE_CHECKING:
+    Line = tuple[float, ...]
+else:
+    Line = tuple[(float,) * MOST_TAPS]
 
 
 class DelayLines(NamedTuple):

@@ -377,5 +377,5 @@ def test_celsius_for_kelvin_is_refused_with_a_hint() -> None:
 
 
 def test_a_range_that_the_register_word_cannot_hold_is_refused() -> None:
-    with pytest.raises(ValueRefusedError, match=r"sensor.gyro.range = .*register word ends at 32768 LSB"):
+    with pytest.raises(ValueRefusedError, match=r"sensor.gyro.range = .*register word ends at gyro.code_limit LSB"):
         Run(MODEL, with_parts(REAL, gyro={"range": 20.0}), Inputs(), name="sensor")

@@ -109,14 +109,14 @@ def test_bias_instability_is_stationary_from_its_first_call_on() -> None:
 
 def test_register_codes_round_and_saturate() -> None:
     lsb = 1.0 / devices.ADXRS450.sensitivity.si
-    assert quantiser.register_code(math.radians(300.0), devices.ADXRS450.range.si, lsb, 16) == 24000
-    assert quantiser.register_code(math.radians(-400.0), devices.ADXRS450.range.si, lsb, 16) == -24000
-    assert quantiser.register_code(1.49 * lsb, 1.0, lsb, 16) == 1
-    assert quantiser.register_code(-1.49 * lsb, 1.0, lsb, 16) == -1
+    assert quantiser.register_code(math.radians(300.0), devices.ADXRS450.range.si, lsb, 2.0**15) == 24000
+    assert quantiser.register_code(math.radians(-400.0), devices.ADXRS450.range.si, lsb, 2.0**15) == -24000
+    assert quantiser.register_code(1.49 * lsb, 1.0, lsb, 2.0**15) == 1
+    assert quantiser.register_code(-1.49 * lsb, 1.0, lsb, 2.0**15) == -1
     g = devices.ADXL355.sensitivity.si
-    assert quantiser.register_code(9.80665, devices.ADXL355.range.si, 1 / g, 20) == 256000
-    assert quantiser.register_code(50.0, devices.ADXL355.range.si, 1 / g, 20) == 2**19 - 1
-    assert quantiser.register_code(-50.0, devices.ADXL355.range.si, 1 / g, 20) == -(2**19)
+    assert quantiser.register_code(9.80665, devices.ADXL355.range.si, 1 / g, 2.0**19) == 256000
+    assert quantiser.register_code(50.0, devices.ADXL355.range.si, 1 / g, 2.0**19) == 2**19 - 1
+    assert quantiser.register_code(-50.0, devices.ADXL355.range.si, 1 / g, 2.0**19) == -(2**19)
     assert quantiser.over_range(1.1, 1.0) == 1.0
     assert quantiser.over_range(-0.9, 1.0) == 0.0
 
@@ -141,14 +141,14 @@ def ramp_delay_of_gyro(axis: int) -> float:
     part = part._replace(scale_error=ZERO3, cross_axis=(ZERO3, ZERO3, ZERO3), g_sensitivity=(ZERO3, ZERO3, ZERO3))
     k = gyro.gyro_coefficients(part, IDENTITY3, False)
     k = k._replace(sample_deviation=ZERO3)
-    state = gyro.initial_gyro(axis, ZERO3, ZERO3, 0.0, part, k)
+    state, _ = gyro.initial_gyro(axis, ZERO3, ZERO3, 0.0, 1.0, part, k)
     period = k.sense_period[axis]
     shown = 0.0
     for tick in range(1, 401):
         t = tick * period
-        state = gyro.sense(axis)(state, (t, t, t), ZERO3, k)
+        state = gyro.sense(axis)(state, (t, t, t), ZERO3, 1.0, part, k)
         if tick % gyro.SENSES_PER_REGISTER == 0:
-            state = gyro.register(axis)(state, 0.0, part, k, (0.0, 0.0))
+            state = gyro.register(axis)(state, 0.0, part, k, (), (0.0, 0.0, 0.0, 0.0))
             shown = state.code * part.resolution
     return 400 * period - shown
 
