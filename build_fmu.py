@@ -1,4 +1,4 @@
-"""Builds the FMUs: ``python build_fmu.py [--dist DIST] [NAME ...]``."""
+"""Builds the FMUs of a release, of both kinds and for every platform: ``python build_fmu.py [NAME ...]``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from attitude_fmu.fmu_src.build import build_all
+from attitude_fmu.fmu_src.build import Platforms
+from attitude_fmu.fmu_src.build_messages import Kinds, build_and_tell
 from attitude_fmu.fmu_src.catalogue import CATALOGUE
 from attitude_fmu.models.errors import AttitudeFmuError
 
@@ -18,17 +19,23 @@ _NAMES = ", ".join(entry.identifier for entry in CATALOGUE)
 
 def main(
     names: Annotated[list[str] | None, typer.Argument(help=f"Which FMUs: {_NAMES}. All if none is named.")] = None,
-    dist: Annotated[Path, typer.Option(help="Folder to put them in.")] = Path("dist"),
+    kind: Annotated[Kinds, typer.Option(help="Compiled from C, or run by Python, or both.")] = "all",
+    platform: Annotated[
+        Platforms, typer.Option(help="What native FMUs are compiled for: this machine, or all.")
+    ] = "all",
+    dist: Annotated[
+        Path, typer.Option(help="Folder to put them in; the Python kind goes to its folder python.")
+    ] = Path("dist"),
 ) -> None:
-    """Build the FMUs from the models in Python, through pythonfmu."""
-    console = Console()
+    """Build the FMUs from the models, whether there are some already or not.
+
+    From cold a full build takes a minute or two: the compiler makes the C library of every platform once.
+    """
     try:
-        paths = build_all(dist, names, lambda name, event: console.print(f"{name}: {event}"), always=True)
+        build_and_tell(dist, names or None, Console(), kinds=kind, platforms=platform, always=True)
     except AttitudeFmuError as error:
         Console(stderr=True).print(str(error), style="red", markup=False, highlight=False, soft_wrap=True)
         sys.exit(1)
-    for path in paths:
-        console.print(f"{path}  {path.stat().st_size / 1000:.0f} kB")
 
 
 if __name__ == "__main__":

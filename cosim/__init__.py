@@ -12,6 +12,8 @@
 `recording`        results on disk while a run goes on, and as FMPy writes them
 `jobs`             several runs at a time, each in a process of its own
 `scenarios`        ready-made systems by name
+`run`              a run as the command makes it: files and numbers
+`info`             what can be set and recorded, as a list
 `report`           the numbers of a run
 `plot`             the picture of a run
 `recorded_motion`  recordings of real motion fed to an ideal sensor

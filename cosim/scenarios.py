@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
+from rich.console import Console
+
+from attitude_fmu.fmu_src.build import folder_of
+from attitude_fmu.fmu_src.build_messages import build_and_tell
+from attitude_fmu.fmu_src.catalogue import Kind
 from attitude_fmu.models.attitude.rotations import REFERENCE_LATITUDE, STANDARD_GRAVITY, earth_rate_n
 
 from .errors import SystemRefusedError, did_you_mean
 from .interface import Value
+from .ssp import open_ssp
 from .system import Component, ParameterSet, System, connect
 
 WIND_SPEED = 10.0
@@ -23,8 +30,8 @@ VELOCITY_BOUND = 0.02
 class Scenario(NamedTuple):
     """A coupled system that the project offers.
 
-    `fmus` are the FMUs that it needs, `record` what is worth recording, `attitude` the true yaw, pitch and roll (rad)
-    where no component tells them.
+    `fmus` are the FMUs that it needs, `system` makes it of those in a folder, `record` is what is worth recording,
+    `attitude` the true yaw, pitch and roll (rad) where no component tells them.
     """
 
     name: str
@@ -120,3 +127,22 @@ def scenario_called(name: str) -> Scenario:
             f"(scenarios: {', '.join(known)}; or give an .ssp file, to info also an .fmu file)"
         )
     return known[name]
+
+
+@contextmanager
+def opened(what: str, dist: Path, kind: Kind) -> Iterator[tuple[System, Scenario | None]]:
+    """The system that `what` names: an .ssp file, or a scenario, whose FMUs are built into `dist` where stale.
+
+    Raises `SystemRefusedError` if it is neither, `BuildError` if an FMU cannot be built.
+    """
+    if what.lower().endswith(".ssp"):
+        with open_ssp(Path(what)) as system:
+            yield system, None
+        return
+    if Path(what).exists() and what not in [scenario.name for scenario in SCENARIOS]:
+        found = "a folder" if Path(what).is_dir() else "no .ssp file"
+        raise SystemRefusedError(f"{what} is {found}; give the .ssp file of a system, or the name of a scenario")
+    scenario = scenario_called(what)
+    console = Console(stderr=True)
+    build_and_tell(dist, scenario.fmus, console, kinds=kind, only_built=True, option="--fmu")
+    yield scenario.system(folder_of(dist, kind)), scenario

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 
 from ..models.record import Boolean, Enumeration, Real, allowed
 from ..models.system import Model
@@ -43,6 +44,8 @@ body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 75rem
 table { border-collapse: collapse; width: 100%; margin-bottom: 2rem; }
 th, td { text-align: left; vertical-align: top; padding: .25rem .6rem; border-bottom: 1px solid #d7dde4; }
 th { background: #eef2f6; } td:first-child { font-family: ui-monospace, monospace; white-space: nowrap; }
+td:nth-child(2), td:nth-child(5) { white-space: nowrap; }
+td:nth-child(4) { min-width: 9rem; } td:last-child { width: 36%; }
 """
 
 _REFUSAL: dict[Kind, str] = {
@@ -100,7 +103,10 @@ def _values(variable: Variable) -> list[str]:
     if isinstance(fact, Enumeration):
         return [f"{number} {item.name}: {item.description}" for number, item in enumerate(fact.items, 1)]
     is_bounded = isinstance(fact, Boolean) or not fact.min is fact.max is None
-    return [allowed(fact)] if variable.start is not None or is_bounded else []
+    if variable.start is None and not is_bounded:
+        return []
+    # without the unit, which has a column of its own
+    return [re.sub(rf" {re.escape(fact.unit)}(?= or |$)", "", allowed(fact)).replace("any finite number", "any")]
 
 
 def _row(variable: Variable, description: str) -> str:

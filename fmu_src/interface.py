@@ -64,7 +64,7 @@ class Interface(NamedTuple):
 
 
 _REFUSED = Leaf(
-    "refused_calls", Integer("calls that were refused since the instance was made; the log tells why", min=0), None
+    "refused_calls", Integer("calls refused since the instance was made or reset; the log tells why", min=0), None
 )
 
 

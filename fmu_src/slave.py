@@ -111,7 +111,12 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         until = current_time + step_size
         self._stale |= OUTPUTS | STATE
         self._stage = STOPPED  # unless the step succeeds
-        run.advance(self._inputs, until)
+        state, counts = run.state, tuple(run.counts)
+        try:
+            run.advance(self._inputs, until)
+        except BaseException:
+            run.restore(Snapshot(tuple(flatten(state)), counts))
+            raise
         self._stage = STEPPING
         self._time = until
         return True

@@ -15,6 +15,10 @@ ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 
 
+FILE_NAME = re.compile(r"# (\w+\.py)\n")
+"""First line of an example that the reader is told to save."""
+
+
 def examples() -> list[tuple[str, str]]:
     found = []
     for page in PAGES:
@@ -28,8 +32,12 @@ def examples() -> list[tuple[str, str]]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder as a reader has it: the FMUs built, and the examples that are files saved."""
     place = tmp_path_factory.mktemp("reader")
     build_all(place / "dist")
+    for _, code in examples():
+        if name := FILE_NAME.match(code):
+            (place / name[1]).write_text(code, encoding="utf-8")
     return place
 
 
@@ -37,6 +45,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_example_runs_as_printed(code: str, folder: Path) -> None:
     done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_every_heading_that_a_page_links_to_exists() -> None:
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        headings = {re.sub(r"\W+", "-", line.lower()) for line in re.findall(r"^#+ (.+)$", text, re.MULTILINE)}
+        for target in re.findall(r"\]\(#([^)]+)\)", text):
+            assert target in headings, f"{page.name} links to #{target}"
 
 
 def test_every_page_that_a_page_links_to_exists() -> None:

@@ -47,12 +47,12 @@ PLATFORMS = (
 
 def host_platform() -> Platform:
     """The platform of this machine. Raises `BuildError` if FMUs are not built for it."""
-    is_arm = platform.machine().lower() in ("arm64", "aarch64")
+    number = {"x86_64": 0, "amd64": 0, "aarch64": 1, "arm64": 1}.get(platform.machine().lower())
     folders = {"linux": ("linux64", "aarch64-linux"), "win32": ("win64",), "darwin": ("darwin64", "aarch64-darwin")}
     of_system = folders.get(sys.platform, ())
-    if len(of_system) <= is_arm:
+    if number is None or number >= len(of_system):
         raise BuildError(f"native FMUs are not built for {sys.platform} on {platform.machine()}; use the Python kind")
-    return next(candidate for candidate in PLATFORMS if candidate.folder == of_system[is_arm])
+    return next(candidate for candidate in PLATFORMS if candidate.folder == of_system[number])
 
 
 def headers() -> Path:
@@ -66,7 +66,10 @@ def headers() -> Path:
 def compiler() -> list[str]:
     """The command that compiles. Raises `BuildError` if it is not installed."""
     if importlib.util.find_spec("ziglang") is None:
-        raise BuildError("native FMUs are compiled with the package ziglang, which is missing: pip install ziglang")
+        raise BuildError(
+            "native FMUs are compiled with the package ziglang, which is missing: pip install ziglang, or use the "
+            "Python kind"
+        )
     return [sys.executable, "-m", "ziglang", "cc"]
 
 

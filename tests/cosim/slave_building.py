@@ -21,7 +21,7 @@ def build(source: Path, target: Path) -> Path:
 
 
 def with_units(fmu: Path, target: Path, definitions: str, unit: str) -> Path:
-    """The gain with units on its variables, in `target`."""
+    """The FMU with units on its variables, in `target`."""
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(target, "w") as new:
         for name in old.namelist():
             data = old.read(name)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
 import subprocess
@@ -12,13 +13,17 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+from slave_building import with_units
 from typer.testing import CliRunner, Result
 
 from attitude_fmu.cosim.command_line import application
 from attitude_fmu.cosim.interface import read_interface
 from attitude_fmu.cosim.recording import read_csv, write_csv
 from attitude_fmu.cosim.ssp import open_ssp, read_ssv, write_ssp
-from attitude_fmu.cosim.system import Component, System, check, start_values
+from attitude_fmu.cosim.system import Component, System, check, connect, start_values
+from attitude_fmu.fmu_src.build import folder_of
+from attitude_fmu.fmu_src.catalogue import KINDS, Kind
+from attitude_fmu.fmu_src.native.compile import host_platform
 
 HEARING_CTRL_C = """
 import signal
@@ -30,11 +35,19 @@ main()
 
 @pytest.fixture(scope="session")
 def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The project's FMUs, built once for these tests."""
+    """The project's FMUs of the native kind, built once for these tests."""
     folder = tmp_path_factory.mktemp("dist")
     done = run("build", "--dist", str(folder))
     assert done.exit_code == 0, done.stderr
     return folder
+
+
+@pytest.fixture(scope="session")
+def both_kinds(dist: Path) -> Path:
+    """The folder `dist`, with the FMUs of the Python kind as well."""
+    done = run("build", "--kind", "python", "--dist", str(dist))
+    assert done.exit_code == 0, done.stderr
+    return dist
 
 
 def run(*arguments: str) -> Result:
@@ -96,6 +109,28 @@ def test_step_of_communication_and_order_agree_at_rest(dist: Path, tmp_path: Pat
     assert ends[0] == ends[1] == ends[2]
 
 
+def test_both_kinds_give_the_same_run_and_the_written_system_carries_the_one_that_ran(
+    both_kinds: Path, tmp_path: Path
+) -> None:
+    rows = {}
+    for kind in KINDS:
+        out = tmp_path / kind
+        settings = ("--set", "sensor.alignment.duration=0.2", "--set", "sensor.seed=7")
+        place = ("--dist", str(both_kinds), "--out", str(out))
+        done = run("run", "--fmu", kind, "--stop", "0.5", "--step", "0.005", *place, *settings)
+        assert done.exit_code == 0, done.stderr
+        rows[kind] = read_csv(out / "results.csv")
+        with zipfile.ZipFile(out / "system.ssp") as archive:
+            carried = archive.read("resources/AttitudeSensor.fmu")
+        assert carried == (folder_of(both_kinds, kind) / "AttitudeSensor.fmu").read_bytes()
+    assert rows["native"].dtype == rows["python"].dtype
+    for name in rows["native"].dtype.names:
+        if sys.platform == "linux":
+            assert (rows["native"][name] == rows["python"][name]).all(), name
+        else:
+            np.testing.assert_allclose(rows["native"][name], rows["python"][name], rtol=1e-9, err_msg=name)
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
@@ -122,6 +157,9 @@ def test_step_of_communication_and_order_agree_at_rest(dist: Path, tmp_path: Pat
         (("run", "--master", "newton"), 2, "newton"),
         (("build", "AtitudeSensor"), 1, "AtitudeSensor"),
         (("info", "none.fmu"), 1, "FMU not found: none.fmu"),
+        (("run", "static", "--fmu", "fortran"), 2, "'fortran' is not one of"),
+        (("run", "mine.ssp", "--fmu", "python"), 2, "--fmu python: mine.ssp is taken as it is"),
+        (("build", "--platform", "amiga"), 2, "'amiga' is not one of"),
     ],
 )
 def test_wrong_request_is_one_clear_line(
@@ -133,8 +171,7 @@ def test_wrong_request_is_one_clear_line(
     assert done.exit_code == code
     assert message in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr
-    ours = [line for line in done.stderr.splitlines() if not line.startswith("building ")]
-    assert len(ours) == 1 or code == 2
+    assert len(done.stderr.splitlines()) == 1 or code == 2
 
 
 @pytest.mark.parametrize(
@@ -173,12 +210,45 @@ def test_system_and_parameters_that_were_given_are_not_overwritten(fmus: dict[st
         assert back.stop_time == 0.5
 
 
-def test_bad_value_is_refused_in_the_words_of_the_fmu(dist: Path, tmp_path: Path) -> None:
+def test_value_out_of_its_range_is_refused_before_the_start(dist: Path, tmp_path: Path) -> None:
     settings = ("--set", "sensor.temperature=25")
     done = run("run", "static", "--stop", "0.1", "--out", str(tmp_path), "--dist", str(dist), *settings)
     assert done.exit_code == 1
-    assert "sensor.temperature = 25 K: too small (allowed: 200 to 450 K)" in done.stderr
-    assert len(done.stderr.split("attitude-fmu:")[1].strip().splitlines()) == 1
+    assert done.stderr == "attitude-fmu: sensor.temperature = 25 K: too small (allowed: 200 to 450 K)\n"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_values_that_do_not_go_together_are_refused_in_the_words_of_the_fmu(
+    both_kinds: Path, tmp_path: Path, kind: Kind
+) -> None:
+    place = ("--out", str(tmp_path), "--dist", str(both_kinds))
+    done = run("run", "--fmu", kind, "--stop", "0.1", *place, "--set", "plant.tripod.stiffness.pitch=1")
+    assert done.exit_code == 1
+    assert done.stderr.startswith(
+        "attitude-fmu: plant: start values refused: plant.tripod.stiffness.pitch = 1 N.m/rad: "
+        "the camera's weight tips the tripod over (allowed: 6.8"
+    )
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("kind", "status"), [("native", "error"), ("python", "fatal")])
+def test_input_that_leaves_its_range_ends_the_run_in_the_words_of_the_fmu(
+    both_kinds: Path, fmus: dict[str, Path], tmp_path: Path, kind: Kind, status: str
+) -> None:
+    kelvin = '<Unit name="K"><BaseUnit K="1"/></Unit>'
+    oven = with_units(fmus["integrator"], tmp_path / "oven.fmu", kelvin, "K")
+    sensor = Component("sensor", folder_of(both_kinds, kind) / "AttitudeSensor.fmu")
+    system = System(
+        "oven", (Component("oven", oven), sensor), connect("oven", "sensor", ("x", "temperature")), stop_time=1.0
+    ).with_values("heat", {"oven.x0": 300.0, "oven.drive": 400.0})
+    out = tmp_path / "out"
+    done = run("run", str(write_ssp(system, tmp_path / "oven.ssp")), "--step", "0.125", "--out", str(out))
+    assert done.exit_code == 1
+    assert done.stderr == (
+        f"attitude-fmu: sensor: fmi2SetReal returned {status} at t = 0.375 s: "
+        f"sensor.temperature = 500 K: too large (allowed: 200 to 450 K); what was recorded until then is in {out}\n"
+    )
+    assert read_csv(out / "results.csv")["time"][-1] == 0.375
 
 
 def test_failing_fmu_leaves_its_results(fmus: dict[str, Path], tmp_path: Path) -> None:
@@ -244,10 +314,53 @@ def test_ctrl_c_says_so_and_keeps_the_results(dist: Path, tmp_path: Path) -> Non
     assert not spill.exists()
 
 
+def test_build_tells_what_was_built_and_for_what(tmp_path: Path) -> None:
+    native, python = (folder_of(tmp_path, kind) / "GimbalController.fmu" for kind in KINDS)
+    command = ("build", "GimbalController", "--kind", "all", "--dist", str(tmp_path))
+    told = run(*command).stdout
+    sizes = [f"{path.stat().st_size / 1000:.0f} kB" for path in (native, python)]
+    assert told.splitlines() == [
+        f"building {native}",
+        f"built {native}, {sizes[0]}, for {host_platform().folder}",
+        f"building {python}",
+        f"built {python}, {sizes[1]}, for Python",
+    ]
+    assert [line.split(",")[0] for line in run(*command).stdout.splitlines()] == [
+        f"up to date {native}",
+        f"up to date {python}",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option"), [(("run", "static"), "--fmu"), (("info", "static"), "--fmu"), (("build",), "--kind")]
+)
+def test_where_native_fmus_cannot_be_built_the_other_kind_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], option: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr("platform.machine", lambda: "riscv64")
+        done = run(*arguments)
+    assert done.exit_code == 1
+    way_out = f"use the Python kind ({option} python)\n"
+    assert done.stderr == f"attitude-fmu: native FMUs are not built for {sys.platform} on riscv64; {way_out}"
+    find_spec = importlib.util.find_spec
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            "importlib.util.find_spec", lambda name, *more: None if name == "ziglang" else find_spec(name, *more)
+        )
+        done = run(*arguments)
+    assert done.exit_code == 1
+    assert done.stderr == (
+        "attitude-fmu: native FMUs are compiled with the package ziglang, which is missing: pip install ziglang, or "
+        f"{way_out}"
+    )
+
+
 def test_version_and_help(dist: Path) -> None:
     assert run("--version").stdout.startswith("attitude-fmu ")
     shown = run("run", "--help").stdout
-    for text in ("Examples", "--set", "--master", "attitude-fmu run --stop 10", "overview.png"):
+    for text in ("Examples", "--set", "--master", "--fmu", "attitude-fmu run --stop 10", "overview.png"):
         assert text in shown
     for name in ("AttitudeSensor", "TripodGimbal", "GimbalController"):
         assert read_interface(dist / f"{name}.fmu").variables
@@ -267,22 +380,3 @@ def test_csv_of_a_run_is_what_fmpy_writes(dist: Path, tmp_path: Path) -> None:
     write_csv(tmp_path / "again.csv", results, ["sensor.euler.yaw"])
     fmpy.write_csv(tmp_path / "fmpy.csv", results, ["sensor.euler.yaw"])
     assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "fmpy.csv").read_bytes()
-
-
-def test_libcosim_runs_the_written_system_and_agrees(dist: Path, tmp_path: Path) -> None:
-    execution = pytest.importorskip("libcosimpy.CosimExecution")
-    observer = pytest.importorskip("libcosimpy.CosimObserver")
-    options = ("--stop", "0.2", "--master", "jacobi", "--out", str(tmp_path), "--dist", str(dist))
-    done = run("run", "gimbal", *options)
-    assert done.exit_code == 0, done.stderr
-    ours = read_csv(tmp_path / "results.csv")[-1]
-    theirs = execution.CosimExecution.from_ssp_file(ssp_path=str(tmp_path / "system.ssp"), step_size=1_000_000)
-    last = observer.CosimObserver.create_last_value()
-    theirs.add_observer(last)
-    theirs.step(200)
-    for name in ("plant.euler.pitch", "sensor.euler.roll", "controller.motor_torque.yaw"):
-        component, _, variable = name.partition(".")
-        index = theirs.slave_index_from_instance_name(component)
-        references = {found.name.decode(): found.reference for found in theirs.slave_variables(index)}
-        value = last.last_real_values(index, [references[variable]])[0]
-        assert value == pytest.approx(float(ours[name]), rel=1e-12)

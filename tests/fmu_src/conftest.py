@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -8,12 +9,43 @@ import pytest
 from fmu_instance import EVERY_KIND, Instance
 
 from attitude_fmu.fmu_src.build import build
+from attitude_fmu.fmu_src.catalogue import KINDS, Entry, Kind
+
+Built = Callable[[Entry, Kind], Path]
 
 
 @pytest.fixture(scope="session")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """EveryKind.fmu."""
-    return build(EVERY_KIND, tmp_path_factory.mktemp("dist"), "python")
+def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the FMUs that the tests share."""
+    return tmp_path_factory.mktemp("dist")
+
+
+@pytest.fixture(scope="session")
+def built(dist: Path) -> Built:
+    """Gives the FMU of an entry and kind, built when first asked for."""
+    return cache(lambda entry, kind: build(entry, dist, kind))
+
+
+@pytest.fixture(scope="session", params=KINDS)
+def kind(request: pytest.FixtureRequest) -> Kind:
+    chosen: Kind = request.param
+    return chosen
+
+
+@pytest.fixture(scope="session")
+def fmu(built: Built, kind: Kind) -> Path:
+    """EveryKind.fmu of each kind."""
+    return built(EVERY_KIND, kind)
+
+
+@pytest.fixture(scope="session")
+def python_fmu(built: Built) -> Path:
+    return built(EVERY_KIND, "python")
+
+
+@pytest.fixture(scope="session")
+def native_fmu(built: Built) -> Path:
+    return built(EVERY_KIND, "native")
 
 
 @pytest.fixture

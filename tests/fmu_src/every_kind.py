@@ -58,6 +58,7 @@ class Outputs(NamedTuple):
     count: Annotated[float, Integer("ticks and shift")]
     moving: Annotated[float, Boolean("rate above noise")]
     level: Annotated[float, Enumeration("Level", (Item("low", "low"), Item("high", "high")), "size")]
+    square: Annotated[float, Real("rad2/s2", "square of the filtered rate")]
 
 
 class NamedOutputs(NamedTuple):
@@ -96,7 +97,7 @@ def outputs(x: State, p: Parameters, c: Coefficients) -> NamedOutputs:
     a, b, d = x.filtered
     size = a * a + b * b + d * d
     high = where(size > 1.0, 2.0, 1.0)
-    return NamedOutputs(Outputs((a + x.drift, b, d), x.ticks + p.shift, where(size > 0.0, 1.0, 0.0), high))
+    return NamedOutputs(Outputs((a + x.drift, b, d), x.ticks + p.shift, where(size > 0.0, 1.0, 0.0), high, size))
 
 
 MODEL = Model(

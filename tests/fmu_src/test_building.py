@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -13,10 +14,13 @@ from fmu_instance import EVERY_KIND
 
 from attitude_fmu.fmu_src import build as building
 from attitude_fmu.fmu_src import sources
-from attitude_fmu.fmu_src.build import build, build_all, is_stale
-from attitude_fmu.fmu_src.catalogue import CATALOGUE, Entry
+from attitude_fmu.fmu_src.build import build, build_all, folder_of, is_stale
+from attitude_fmu.fmu_src.catalogue import CATALOGUE, KINDS, Entry, Kind
 from attitude_fmu.fmu_src.errors import BuildError
-from attitude_fmu.fmu_src.sources import sources_of
+from attitude_fmu.fmu_src.native.compile import host_platform
+from attitude_fmu.fmu_src.sources import fingerprint_of, guid_of, sources_of
+
+Built = Callable[[Entry, Kind], Path]
 
 SOURCE = Path(__file__).with_name("every_kind.py")
 COMMAND = Path(__file__).parents[2] / "build_fmu.py"
@@ -36,41 +40,75 @@ def own_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Entry, P
     return Entry("OwnModel", "own_model"), source
 
 
-def test_the_same_sources_give_the_same_bytes_anywhere(fmu: Path, tmp_path: Path) -> None:
-    again = build(EVERY_KIND, tmp_path / "a folder with blanks" / "dist")
+def test_the_same_sources_give_the_same_bytes_anywhere(fmu: Path, kind: Kind, tmp_path: Path) -> None:
+    again = build(EVERY_KIND, tmp_path / "a folder with blanks" / "dist", kind)
     assert again.read_bytes() == fmu.read_bytes()
 
 
-def test_a_changed_source_changes_the_guid_and_the_module_names(own_model: tuple[Entry, Path], tmp_path: Path) -> None:
+def test_where_the_source_lies_does_not_matter(kind: Kind, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    entry, archives = Entry("MovedModel", "moved_model"), []
+    for folder in (tmp_path / "here", tmp_path / "somewhere else"):
+        folder.mkdir()
+        shutil.copy(SOURCE, folder / "moved_model.py")
+        with monkeypatch.context() as place:
+            place.syspath_prepend(str(folder))
+            archives.append(build(entry, folder, kind))
+    assert archives[0].read_bytes() == archives[1].read_bytes()
+
+
+def test_a_changed_source_changes_the_guid_and_the_module_names(
+    own_model: tuple[Entry, Path], kind: Kind, tmp_path: Path
+) -> None:
     entry, source = own_model
     before = sources_of(entry)
-    build(entry, tmp_path / "dist")
-    assert not is_stale(entry, tmp_path / "dist")
+    build(entry, tmp_path / "dist", kind)
+    assert not is_stale(entry, tmp_path / "dist", kind)
     source.write_text(source.read_text().replace("0.9", "0.8"))
     after = sources_of(entry)
-    assert is_stale(entry, tmp_path / "dist")
-    assert before.guid != after.guid
+    assert is_stale(entry, tmp_path / "dist", kind)
+    assert guid_of(before.fingerprint) != guid_of(after.fingerprint)
     assert before.package != after.package
     assert before.slave_module != after.slave_module
 
 
-@pytest.mark.parametrize("changed", ["fmu_src/description.py", "fmu_src/fmu.png", "pythonfmu/fmi2slave.py"])
+@pytest.mark.parametrize(
+    ("changed", "stale"),
+    [
+        ("fmu_src/description.py", KINDS),
+        ("fmu_src/fmu.png", KINDS),
+        ("fmu_src/native/runtime/noise.c", ("native",)),
+        ("pythonfmu/fmi2slave.py", ("python",)),
+    ],
+)
 def test_what_it_is_built_with_changes_the_guid(
-    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str
+    built: Built, dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str, stale: tuple[Kind, ...]
 ) -> None:
+    for kind in KINDS:
+        built(EVERY_KIND, kind)
     for name, folder in (("fmu_src", sources._HERE), ("pythonfmu", Path(pythonfmu.__file__).parent)):
         shutil.copytree(folder, tmp_path / name)
     monkeypatch.setattr(sources, "_HERE", tmp_path / "fmu_src")
     monkeypatch.setattr(pythonfmu, "__file__", str(tmp_path / "pythonfmu" / "__init__.py"))
-    assert not is_stale(EVERY_KIND, fmu.parent)
+    assert not any(is_stale(EVERY_KIND, dist, kind) for kind in KINDS)
     with (tmp_path / changed).open("ab") as file:
         file.write(b"\n")
-    assert is_stale(EVERY_KIND, fmu.parent)
+    assert tuple(kind for kind in KINDS if is_stale(EVERY_KIND, dist, kind)) == stale
+
+
+def test_a_native_fmu_without_a_platform_that_is_wanted_is_stale(native_fmu: Path) -> None:
+    assert not is_stale(EVERY_KIND, native_fmu.parent, "native", "host")
+    assert is_stale(EVERY_KIND, native_fmu.parent, "native", "all")
+
+
+def test_the_kinds_differ_in_their_guid_and_lie_apart(built: Built) -> None:
+    native, python = (built(EVERY_KIND, kind) for kind in KINDS)
+    assert python == native.parent / "python" / native.name
+    assert fingerprint_of(EVERY_KIND, "native") != fingerprint_of(EVERY_KIND, "python")
 
 
 @pytest.mark.parametrize("own", [False, True])
 def test_files_in_the_current_folder_hide_no_module(
-    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own: bool
+    fmu: Path, kind: Kind, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own: bool
 ) -> None:
     folder = tmp_path / "users"
     folder.mkdir()
@@ -80,9 +118,9 @@ def test_files_in_the_current_folder_hide_no_module(
     monkeypatch.chdir(folder)
     if own:  # an interactive session, whose own folder counts
         monkeypatch.setattr(building.sys, "path", ["", *sys.path])
-        assert build(Entry("UsersModel", "users_model"), tmp_path).is_file()
+        assert build(Entry("UsersModel", "users_model"), tmp_path, kind).is_file()
     else:
-        assert build(EVERY_KIND, tmp_path).read_bytes() == fmu.read_bytes()
+        assert build(EVERY_KIND, tmp_path, kind).read_bytes() == fmu.read_bytes()
 
 
 def test_another_models_source_does_not_change_it() -> None:
@@ -90,26 +128,49 @@ def test_another_models_source_does_not_change_it() -> None:
     assert not [name for name in files if "attitude_sensor" in name or "tripod" in name]
 
 
-def test_a_missing_or_broken_archive_is_stale(tmp_path: Path) -> None:
-    assert is_stale(EVERY_KIND, tmp_path)
-    (tmp_path / "EveryKind.fmu").write_bytes(b"PK, but not really")
-    assert is_stale(EVERY_KIND, tmp_path)
+def test_a_missing_or_broken_archive_is_stale(kind: Kind, tmp_path: Path) -> None:
+    assert is_stale(EVERY_KIND, tmp_path, kind)
+    folder_of(tmp_path, kind).mkdir(exist_ok=True)
+    (folder_of(tmp_path, kind) / "EveryKind.fmu").write_bytes(b"PK, but not really")
+    assert is_stale(EVERY_KIND, tmp_path, kind)
 
 
-def test_it_contains_what_fmi_asks_for(fmu: Path) -> None:
+_HOST = host_platform()
+CONTENT: dict[Kind, tuple[str, ...]] = {
+    "native": (
+        f"binaries/{_HOST.folder}/EveryKind{_HOST.suffix}",
+        "sources/buildDescription.xml",
+        "sources/fmu.c",
+        "sources/model.c",
+        "sources/model.h",
+    ),
+    "python": (
+        "binaries/linux64/EveryKind.so",
+        "binaries/win64/EveryKind.dll",
+        "documentation/licenses/pythonfmu.txt",
+        "resources/slavemodule.txt",
+    ),
+}
+
+
+def test_it_contains_what_fmi_asks_for(fmu: Path, kind: Kind) -> None:
     names = _names(fmu)
     assert names[0] == "modelDescription.xml"
     for wanted in (
-        "binaries/linux64/EveryKind.so",
-        "binaries/win64/EveryKind.dll",
         "documentation/externalDependencies.txt",
         "documentation/index.html",
         "documentation/licenses/license.txt",
         "model.png",
-        "resources/slavemodule.txt",
+        *CONTENT[kind],
     ):
         assert wanted in names
     assert not [name for name in names if "__pycache__" in name or "\\" in name]
+
+
+def test_the_native_kind_carries_no_python_and_the_python_kind_no_c(built: Built) -> None:
+    native, python = (_names(built(EVERY_KIND, kind)) for kind in KINDS)
+    assert not [name for name in native if name.endswith(".py") or name.startswith("resources/")]
+    assert not [name for name in python if name.endswith((".c", ".h"))]
 
 
 def test_binaries_are_executable(fmu: Path) -> None:
@@ -156,19 +217,19 @@ def test_the_reference_page_is_in_groups(fmu: Path) -> None:
     assert places == sorted(places)
 
 
-def test_sources_in_the_fmu_import_nothing_of_the_installed_package(fmu: Path) -> None:
-    with zipfile.ZipFile(fmu) as archive:
+def test_sources_in_the_fmu_import_nothing_of_the_installed_package(python_fmu: Path) -> None:
+    with zipfile.ZipFile(python_fmu) as archive:
         for name in archive.namelist():
             if name.endswith(".py") and "/pythonfmu/" not in name:
                 text = archive.read(name).decode()
                 assert "attitude_fmu." not in text, name
 
 
-def test_many_may_build_at_once(fmu: Path, tmp_path: Path) -> None:
+def test_many_may_build_at_once(fmu: Path, kind: Kind, tmp_path: Path) -> None:
     with ThreadPoolExecutor(3) as pool:
-        built = list(pool.map(lambda _: build(EVERY_KIND, tmp_path), range(3)))
-    assert {path.read_bytes() for path in built} == {fmu.read_bytes()}
-    assert [path.name for path in tmp_path.iterdir()] == ["EveryKind.fmu"]
+        paths = list(pool.map(lambda _: build(EVERY_KIND, tmp_path, kind), range(3)))
+    assert {path.read_bytes() for path in paths} == {fmu.read_bytes()}
+    assert [path.name for path in folder_of(tmp_path, kind).iterdir()] == ["EveryKind.fmu"]
 
 
 def test_a_model_that_does_not_build_leaves_the_old_fmu(own_model: tuple[Entry, Path], tmp_path: Path) -> None:

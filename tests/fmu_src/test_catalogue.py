@@ -8,17 +8,16 @@ from pathlib import Path
 import pytest
 from fmu_instance import Instance
 
-from attitude_fmu.fmu_src.build import build
-from attitude_fmu.fmu_src.catalogue import CATALOGUE
+from attitude_fmu.fmu_src.catalogue import CATALOGUE, Entry, Kind
 
 Load = Callable[..., Instance]
 COMMON = 0.73
 """s, a whole number of every communication step below."""
 
 
-@pytest.fixture(scope="module", params=[entry.identifier for entry in CATALOGUE])
-def archive(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build(str(request.param), tmp_path_factory.mktemp("catalogue"))
+@pytest.fixture(scope="module", params=CATALOGUE, ids=lambda entry: entry.identifier)
+def archive(request: pytest.FixtureRequest, built: Callable[[Entry, Kind], Path], kind: Kind) -> Path:
+    return built(request.param, kind)
 
 
 def test_communication_steps_of_any_length_give_the_same_bits(archive: Path, load: Load) -> None:
@@ -27,21 +26,17 @@ def test_communication_steps_of_any_length_give_the_same_bits(archive: Path, loa
         unit = load(archive).initialise()
         for part in (1, 2):
             unit.step(round(COMMON / length), length, start=(part - 1) * COMMON)
-            shown.append((part, unit.outputs()))
-    assert all(outputs == shown[part - 1][1] for part, outputs in shown)
+            shown.append((part, unit.bits()))
+    assert all(bits == shown[part - 1][1] for part, bits in shown)
 
 
 def test_a_saved_state_goes_on_in_another_instance(archive: Path, load: Load) -> None:
     one, other = load(archive).initialise(), load(archive)
     one.step(20)
-    state = one.fmu.getFMUstate()
-    copy = other.fmu.deSerializeFMUstate(one.fmu.serializeFMUstate(state))
-    other.fmu.setFMUstate(copy)
+    other.restore(one.serialised())
     for unit in (one, other):
         unit.step(20, start=20e-3)
-    assert other.outputs() == one.outputs()
-    one.fmu.freeFMUstate(state)
-    other.fmu.freeFMUstate(copy)
+    assert other.bits() == one.bits()
 
 
 def test_reset_is_like_new(archive: Path, load: Load) -> None:
@@ -50,4 +45,4 @@ def test_reset_is_like_new(archive: Path, load: Load) -> None:
     used.fmu.reset()
     for unit in (fresh, used):
         unit.initialise().step(20)
-    assert used.outputs() == fresh.outputs()
+    assert used.bits() == fresh.bits()

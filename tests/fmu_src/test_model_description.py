@@ -1,27 +1,43 @@
 from __future__ import annotations
 
+import random
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fmpy import read_model_description
+from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
-from fmu_instance import EVERY_KIND
+from fmu_instance import EVERY_KIND, Instance
 from lxml import etree
+from random_records import settable_near
 
-from attitude_fmu.fmu_src.build import build
-from attitude_fmu.fmu_src.catalogue import CATALOGUE, Entry
+from attitude_fmu.fmu_src.catalogue import CATALOGUE, KINDS, Entry, Kind
+from attitude_fmu.models.record import leaves
+
+Built = Callable[[Entry, Kind], Path]
 
 ALL = [EVERY_KIND, *CATALOGUE]
 
+FLAGS: dict[Kind, dict[str, str]] = {
+    "native": {"canInterpolateInputs": "true", "providesDirectionalDerivative": "true"},
+    "python": {"canInterpolateInputs": "false", "providesDirectionalDerivative": "false"},
+}
+SOURCE_FILES: dict[Kind, list[str]] = {"native": ["fmu.c"], "python": []}
+LOG_CATEGORIES: dict[Kind, set[str]] = {
+    "native": {"logEvents", "logStatusError", "logAll"},
+    "python": {"logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"},
+}
+
 
 @pytest.fixture(scope="module", params=ALL, ids=[entry.identifier for entry in ALL])
-def archive(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    entry: Entry = request.param
-    return build(entry, tmp_path_factory.mktemp("described"))
+def archive(request: pytest.FixtureRequest, built: Built, kind: Kind) -> Path:
+    return built(request.param, kind)
 
 
 def _xml(archive: Path) -> Any:
@@ -91,9 +107,77 @@ def test_outputs_depend_on_no_input_directly(archive: Path) -> None:
     assert all(unknown.get("dependencies") == "" for unknown in root.find("ModelStructure/Outputs"))
 
 
-def test_initial_unknowns_are_in_order(archive: Path) -> None:
-    indices = [int(unknown.get("index")) for unknown in _xml(archive).find("ModelStructure/InitialUnknowns")]
-    assert indices == sorted(set(indices))
+def _initial_dependencies(archive: Path) -> dict[str, list[str]]:
+    """What each initial unknown depends on."""
+    root = _xml(archive)
+    names = [variable.get("name") for variable in root.find("ModelVariables")]
+    return {
+        names[int(unknown.get("index")) - 1]: [names[int(i) - 1] for i in unknown.get("dependencies").split()]
+        for unknown in root.find("ModelStructure/InitialUnknowns")
+    }
+
+
+def test_initial_unknowns_are_all_outputs_and_coefficients_in_order(archive: Path) -> None:
+    root = _xml(archive)
+    wanted = [
+        index
+        for index, variable in enumerate(root.find("ModelVariables"), 1)
+        if variable.get("causality") in ("output", "calculatedParameter")
+    ]
+    assert [int(unknown.get("index")) for unknown in root.find("ModelStructure/InitialUnknowns")] == wanted
+
+
+def test_initial_dependencies_are_parameters_and_inputs_in_order(archive: Path) -> None:
+    root = _xml(archive)
+    causalities = [variable.get("causality") for variable in root.find("ModelVariables")]
+    for unknown in root.find("ModelStructure/InitialUnknowns"):
+        indices = [int(index) for index in unknown.get("dependencies").split()]
+        assert indices == sorted(set(indices))
+        assert {causalities[index - 1] for index in indices} <= {"parameter", "input"}
+
+
+RATE = ["rate[1]", "rate[2]", "rate[3]"]
+
+
+@pytest.mark.parametrize(
+    ("unknown", "knowns"),
+    [
+        ("coefficient.fast", ["period"]),
+        ("coefficient.sigma", ["noise.density", "period"]),
+        ("coefficient.whole", []),
+        ("shown.rate[1]", ["gain", "rate[1]"]),
+        ("shown.rate[3]", ["gain", "rate[3]"]),
+        ("shown.count", ["shift"]),
+        ("shown.moving", ["gain", *RATE]),
+        ("shown.level", ["gain", *RATE]),
+        ("shown.square", ["gain", *RATE]),
+        ("refused_calls", []),
+    ],
+)
+def test_an_initial_unknown_depends_on_what_moves_it_alone(fmu: Path, unknown: str, knowns: list[str]) -> None:
+    assert _initial_dependencies(fmu)[unknown] == knowns
+
+
+@pytest.mark.parametrize("entry", ALL, ids=lambda entry: entry.identifier)
+def test_no_parameter_or_input_moves_what_does_not_depend_on_it(
+    built: Built, load: Callable[[Path], Instance], entry: Entry
+) -> None:
+    archive = built(entry, "native")
+    dependencies, unit = _initial_dependencies(archive), load(archive)
+    model, chance = import_module(entry.module).MODEL, random.Random(1)
+    unit.fmu.enterInitializationMode()
+    before, moved = unit.bits(), 0
+    for leaf in (*leaves(model.Parameters), *leaves(model.Inputs)):
+        unit[leaf.name] = settable_near(leaf, leaf.start, chance)
+        try:
+            after = unit.bits()
+        except FMICallException:  # it does not go together with the others
+            after = before
+        changed = {name for name in before if after[name] != before[name]} & set(dependencies)
+        assert not [name for name in changed if leaf.name not in dependencies[name]], leaf.name
+        moved += bool(changed)
+        unit[leaf.name] = leaf.start
+    assert moved >= 5
 
 
 def test_it_can_save_its_state_and_needs_no_tool(archive: Path) -> None:
@@ -101,7 +185,23 @@ def test_it_can_save_its_state_and_needs_no_tool(archive: Path) -> None:
     assert flags["needsExecutionTool"] == "false"
     assert flags["canGetAndSetFMUstate"] == "true"
     assert flags["canSerializeFMUstate"] == "true"
-    assert flags["canInterpolateInputs"] == "false"
+    assert flags["canHandleVariableCommunicationStepSize"] == "true"
+
+
+def test_each_kind_says_what_it_offers(fmu: Path, kind: Kind) -> None:
+    root = _xml(fmu)
+    flags = root.find("CoSimulation").attrib
+    assert {name: flags[name] for name in FLAGS[kind]} == FLAGS[kind]
+    assert [file.get("name") for file in root.iterfind("CoSimulation/SourceFiles/File")] == SOURCE_FILES[kind]
+    assert {category.get("name") for category in root.find("LogCategories")} == LOG_CATEGORIES[kind]
+
+
+@pytest.mark.parametrize("entry", ALL, ids=lambda entry: entry.identifier)
+def test_the_kinds_have_the_same_variables_and_structure(built: Built, entry: Entry) -> None:
+    native, python = (_xml(built(entry, kind)) for kind in KINDS)
+    for part in ("UnitDefinitions", "TypeDefinitions", "DefaultExperiment", "ModelVariables", "ModelStructure"):
+        assert etree.tostring(native.find(part)) == etree.tostring(python.find(part))
+    assert native.get("guid") != python.get("guid")
 
 
 def test_start_values_come_back_exactly(fmu: Path) -> None:
@@ -159,10 +259,6 @@ def test_a_difference_of_temperatures_has_no_offset(fmu: Path) -> None:
     types = _xml(fmu).find("TypeDefinitions")
     assert types.find("SimpleType[@name='TemperatureDifference']/Real").get("relativeQuantity") == "true"
     assert types.find("SimpleType[@name='Temperature']/Real").get("relativeQuantity") is None
-
-
-def test_coefficients_may_depend_on_everything_that_is_set(fmu: Path) -> None:
-    assert [u for u in _xml(fmu).find("ModelStructure/InitialUnknowns") if u.get("dependencies") is not None] == []
 
 
 @pytest.mark.parametrize(

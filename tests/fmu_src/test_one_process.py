@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from attitude_fmu.fmu_src.build import build
-from attitude_fmu.fmu_src.catalogue import Entry
+from attitude_fmu.fmu_src.catalogue import Entry, Kind, entry
+from attitude_fmu.fmu_src.native.compile import host_platform
 
 HERE = Path(__file__).parent
 
@@ -20,6 +22,9 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 from fmu_instance import Instance
 archives = [Path(name) for name in sys.argv[2:] if name.endswith(".fmu")]
+def resident():
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * resource.getpagesize()
 """
 
 
@@ -44,7 +49,7 @@ sys.meta_path.insert(0, Guard())
 
 
 @pytest.fixture
-def other_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def other_version(tmp_path: Path, kind: Kind, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The test FMU with another filter and the same names."""
     source = (HERE / "every_kind.py").read_text()
     (tmp_path / "changed").mkdir()
@@ -52,7 +57,7 @@ def other_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         source.replace("0.9", "0.5").replace("0.1, _driven", "0.5, _driven")
     )
     monkeypatch.syspath_prepend(str(tmp_path / "changed"))
-    return build(Entry("EveryKind", "every_kind"), tmp_path)
+    return build(Entry("EveryKind", "every_kind"), tmp_path, kind)
 
 
 def test_two_versions_live_in_one_process(fmu: Path, other_version: Path) -> None:
@@ -94,8 +99,8 @@ print(second["shown.count"], third["shown.count"])
     assert out.split() == ["4", "5"]
 
 
-def test_it_leaves_the_path_as_it_was(fmu: Path) -> None:
-    out = _run(_HEAD + "before = list(sys.path); unit = Instance(archives[0]); print(before == sys.path)", fmu)
+def test_it_leaves_the_path_as_it_was(python_fmu: Path) -> None:
+    out = _run(_HEAD + "before = list(sys.path); unit = Instance(archives[0]); print(before == sys.path)", python_fmu)
     assert out.strip() == "True"
 
 
@@ -106,7 +111,7 @@ folder = pathlib.Path(tempfile.mkdtemp())
 zipfile.ZipFile(sys.argv[2]).extractall(folder)
 text = (folder / "modelDescription.xml").read_text()
 guid = text.split('guid="')[1].split('"')[0].encode()
-fmi = ctypes.CDLL(str(folder / "binaries/linux64/EveryKind.so"))
+fmi = ctypes.CDLL(str(folder / "binaries" / sys.argv[3]))
 class Callbacks(Structure):
     _fields_ = [(name, c_void_p) for name in ("logger", "allocate", "free", "finished", "environment")]
 callbacks = Callbacks()
@@ -129,12 +134,16 @@ print("numpy" in sys.modules, "lxml" in sys.modules, "attitude_fmu" in sys.modul
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="loads the Linux binary by hand")
-def test_it_needs_nothing_but_python_itself(fmu: Path) -> None:
+def test_it_needs_nothing_but_the_host_itself(fmu: Path) -> None:
     blocked = ("numpy", "lxml", "attitude_fmu", "matplotlib", "fmpy", "scipy", "typing_extensions", "casadi")
-    assert _run(_BARE_HOST, fmu, blocked=blocked).split() == ["False", "False", "False"]
+    assert _run(_BARE_HOST, fmu, f"{host_platform().folder}/EveryKind.so", blocked=blocked).split() == [
+        "False",
+        "False",
+        "False",
+    ]
 
 
-def test_errors_and_resets_leave_no_instance_behind(fmu: Path) -> None:
+def test_errors_and_resets_leave_no_python_object_behind(python_fmu: Path) -> None:
     out = _run(
         _HEAD
         + """
@@ -165,7 +174,7 @@ for i in range(50):
     unit.fmu.freeInstance()
 print(living(), sys.getrefcount(kind), sys.getrefcount(vars(module)))
 """,
-        fmu,
+        python_fmu,
     )
     first, last = out.strip().splitlines()
     assert first == "(7, 3, 1) (1, 7, 3)"
@@ -190,9 +199,6 @@ def run(begin, end):
             state = unit.fmu.getFMUstate()
             unit.fmu.setFMUstate(state)
             unit.fmu.freeFMUstate(state)
-def resident():
-    with open("/proc/self/statm") as file:
-        return int(file.read().split()[1]) * resource.getpagesize()
 STEPS = int(sys.argv[3])
 run(0, STEPS // 10)
 before = resident()
@@ -207,7 +213,40 @@ def test_memory_does_not_grow(fmu: Path) -> None:
     assert int(_run(_MEMORY, fmu, 20_000)) < 500_000
 
 
+_LIVES = (
+    _HEAD
+    + """
+from fmpy.fmi2 import fmi2CallbackFunctions
+unit = Instance(archives[0])
+unit.fmu.fmi2FreeInstance(unit.fmu.component)
+def live(times):
+    for _ in range(times):
+        unit.fmu.instantiate(callbacks=fmi2CallbackFunctions())
+        unit.initialise().step(2)
+        for call in (lambda: unit.fmu.getReal([4711]), lambda: unit.__setitem__("temperature", 25.0)):
+            try:
+                call()
+            except Exception:
+                pass
+        unit.restore(unit.serialised())
+        unit.fmu.reset()
+        unit.fmu.fmi2FreeInstance(unit.fmu.component)
+live(300)
+before = resident()
+live(3000)
+print(resident() - before)
+"""
+)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_instances_that_come_and_go_leave_no_memory_behind(native_fmu: Path) -> None:
+    assert int(_run(_LIVES, native_fmu)) < 200_000  # one instance has 2 kB
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_memory_of_the_attitude_sensor_does_not_grow_in_a_million_steps(tmp_path: Path) -> None:
-    assert int(_run(_MEMORY, build("AttitudeSensor", tmp_path), 1_000_000)) < 500_000
+def test_memory_of_the_attitude_sensor_does_not_grow_in_a_million_steps(
+    built: Callable[[Entry, Kind], Path], kind: Kind
+) -> None:
+    assert int(_run(_MEMORY, built(entry("AttitudeSensor"), kind), 1_000_000)) < 500_000

@@ -36,6 +36,7 @@ def test_value_references_count_the_variables() -> None:
         ("coefficient.sigma", "Real", "calculatedParameter", "tunable", "calculated", None),
         ("state.filtered[3]", "Real", "local", "discrete", "calculated", None),
         ("state.ticks", "Integer", "local", "discrete", "calculated", None),
+        ("refused_calls", "Integer", "output", "discrete", "calculated", None),
     ],
 )
 def test_a_field_becomes_a_variable(

@@ -12,29 +12,17 @@ from typing import Any
 
 import casadi
 import pytest
+from random_records import bits, legal_parameters, points_near
 
 from attitude_fmu.fmu_src.catalogue import CATALOGUE
 from attitude_fmu.models import scalar
 from attitude_fmu.models.attitude.rotations import Euler, euler_from_matrix, matrix_from_euler
-from attitude_fmu.models.errors import ValueRefusedError
-from attitude_fmu.models.record import Boolean, Enumeration, Integer, Leaf, Real, defaults, flatten, leaves, unflatten
+from attitude_fmu.models.record import defaults, flatten, leaves, unflatten
 from attitude_fmu.models.scalar import PI
-from attitude_fmu.models.system import Model, Run, check_rules
+from attitude_fmu.models.system import Model, Run
 
 MODELS = [import_module(entry.module).MODEL for entry in CATALOGUE]
 POINTS = 60
-COUNTERS = {
-    "ticks": (0, 1, 7, 4999, 5001, 5008, 5012, 5063, 9998, 10_003, 123_456),
-    "wind.calls": (0, 1, 500),
-    "engaged": (0, 1),
-    "attitude.alignment.samples": (0, 10, 999, 1000, 1001),
-    "attitude.fusion.rest.quiet": (0.0, 1.0, 1.6, 4.0),
-    "accelerometer.samples": (0, 4, 5, 7),
-}
-"""Values that reach every branch: start, shutter and knock, end of the alignment, rest, a due word."""
-
-NEVER_WILD = ("attitude.q_nb", "attitude.fusion.covariance")
-"""What no run can bring to zero or to a hundred times itself."""
 
 
 @pytest.fixture(autouse=True)
@@ -57,47 +45,6 @@ def traced(function: Callable[..., Any], *records: type, draws: int = 0) -> Call
     result = casadi.vertcat(*flatten(function(*values)))
     compiled = casadi.Function("f", [casadi.vertcat(*flat) for flat in [*arguments, normals]], [result])
     return lambda *points: compiled(*points).full().ravel().tolist()
-
-
-def near(leaf: Leaf, value: float, chance: random.Random) -> float:
-    """A random legal value near `value`."""
-    fact = leaf.fact
-    if isinstance(fact, Enumeration):
-        return chance.randint(1, len(fact.items))
-    if isinstance(fact, Boolean):
-        return chance.randint(0, 1)
-    if leaf.name in COUNTERS:
-        return chance.choice(COUNTERS[leaf.name])
-    if isinstance(fact, Integer):
-        return value
-    assert isinstance(fact, Real)
-    low = fact.min if fact.min is not None else -float("inf")
-    high = fact.max if fact.max is not None else float("inf")
-    wild = chance.random()
-    if wild < 0.1 and not leaf.name.startswith(NEVER_WILD):
-        moved = 0.0 if wild < 0.05 else 100.0 * value
-    else:
-        moved = value * (1.0 + 0.1 * chance.gauss(0.0, 1.0)) + (0.001 * chance.gauss(0.0, 1.0) if value == 0.0 else 0.0)
-    return min(max(moved, low), high)
-
-
-def points_near(record: type, centre: Any, chance: random.Random) -> list[float]:
-    return [float(near(leaf, value, chance)) for leaf, value in zip(leaves(record), flatten(centre), strict=True)]
-
-
-def bits(values: list[float]) -> list[str]:
-    return [float(value).hex() for value in values]
-
-
-def legal_parameters(model: Model, chance: random.Random) -> list[float]:
-    """Random parameters that go together."""
-    while True:
-        parameters = points_near(model.Parameters, defaults(model.Parameters), chance)
-        try:
-            check_rules(model, unflatten(model.Parameters, parameters), model.name)
-        except ValueRefusedError:
-            continue
-        return parameters
 
 
 def random_cases(model: Model, seed: int) -> Iterator[tuple[list[float], list[float], list[float], list[float]]]:

@@ -109,6 +109,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean has_toleranc
         return refuse(instance, "%s: the start time is %.15g s (allowed: up to %.15g s)", instance->name, start_time,
                       LATEST_TIME);
     instance->now.start_time = instance->now.time = start_time;
+    instance->now.stale = EVERYTHING_STALE; /* the clocks' ticks count from the start time */
     return fmi2OK;
 }
 
@@ -157,14 +158,22 @@ fmi2Status fmi2Reset(fmi2Component component)
 
 static const char *const TYPE_NAME[] = {"Real", "Integer", "Boolean", "Enumeration"};
 
+static const char NO_VARIABLE[] = "%s: there is no variable with value reference %u";
+static const char OTHER_TYPE[] = "%s: %s is of type %s, not %s";
+
+static int exists(fmi2ValueReference reference)
+{
+    return reference < VARIABLES && VARIABLE[reference].type != HIDDEN;
+}
+
 /* The variable behind a reference, if it is of the type that the called function is for. */
 static fmi2Status find(Instance *instance, fmi2ValueReference reference, Type wanted)
 {
-    if (reference >= VARIABLES || VARIABLE[reference].type == HIDDEN)
-        return refuse(instance, "%s: there is no variable with value reference %u", instance->name, reference);
+    if (!exists(reference))
+        return refuse(instance, NO_VARIABLE, instance->name, reference);
     if (VARIABLE[reference].type == wanted || (VARIABLE[reference].type == ENUMERATION && wanted == INTEGER))
         return fmi2OK;
-    return refuse(instance, "%s: %s is of type %s, not %s", instance->name, VARIABLE[reference].name,
+    return refuse(instance, OTHER_TYPE, instance->name, VARIABLE[reference].name,
                   TYPE_NAME[VARIABLE[reference].type], wanted == INTEGER ? "Integer or Enumeration" : TYPE_NAME[wanted]);
 }
 
@@ -228,11 +237,16 @@ fmi2Status fmi2GetBoolean(fmi2Component component, const fmi2ValueReference refe
 
 fmi2Status fmi2GetString(fmi2Component component, const fmi2ValueReference references[], size_t count, fmi2String values[])
 {
+    Instance *instance = component;
     (void)values;
-    if (!component)
+    if (!instance)
         return fmi2Error;
-    return count ? refuse(component, "%s: value reference %u is no string", ((Instance *)component)->name, references[0])
-                 : fmi2OK;
+    if (count == 0)
+        return fmi2OK;
+    if (!exists(references[0]))
+        return refuse(instance, NO_VARIABLE, instance->name, references[0]);
+    return refuse(instance, OTHER_TYPE, instance->name, VARIABLE[references[0]].name,
+                  TYPE_NAME[VARIABLE[references[0]].type], "String");
 }
 
 static const char *fault_of_value(fmi2ValueReference reference, double value)
@@ -249,25 +263,28 @@ static const char *fault_of_value(fmi2ValueReference reference, double value)
     return strcmp(settable->unit, "K") ? "too small" : "too small, kelvin wanted";
 }
 
-/* Whether one value may be set now. */
-static fmi2Status allow(Instance *instance, fmi2ValueReference reference, Type type, double value)
+static fmi2Status check_causality(Instance *instance, fmi2ValueReference reference)
 {
-    const char *fault;
-    if (find(instance, reference, type) != fmi2OK)
-        return fmi2Error;
-    if (reference >= OUTPUTS_AT)
-        return refuse(instance, "%s: %s cannot be set: its causality is %s", instance->name, VARIABLE[reference].name,
-                      reference < COEFFICIENTS_AT || reference == REFUSED_AT ? "output"
-                      : reference < STATE_AT                                 ? "calculatedParameter"
-                                                                             : "local");
-    fault = fault_of_value(reference, value);
-    if (fault)
-        return refuse_value(instance, reference, value, fault);
-    if (require(instance, "setting values", INSTANTIATED, STEPPING) != fmi2OK)
-        return fmi2Error;
-    if (instance->now.stage == STEPPING && reference < INPUTS_AT && !SETTABLE[reference].is_tunable)
-        return refuse_value(instance, reference, value, "fixed, can be set only before the end of initialisation");
-    return fmi2OK;
+    if (reference < OUTPUTS_AT)
+        return fmi2OK;
+    return refuse(instance, "%s: %s cannot be set: its causality is %s", instance->name, VARIABLE[reference].name,
+                  reference < COEFFICIENTS_AT || reference == REFUSED_AT ? "output"
+                  : reference < STATE_AT                                 ? "calculatedParameter"
+                                                                         : "local");
+}
+
+static fmi2Status check_value(Instance *instance, fmi2ValueReference reference, double value)
+{
+    const char *fault = fault_of_value(reference, value);
+    return fault ? refuse_value(instance, reference, value, fault) : fmi2OK;
+}
+
+/* Whether the variable may still be set at this stage. */
+static fmi2Status check_variability(Instance *instance, fmi2ValueReference reference, double value)
+{
+    if (instance->now.stage < STEPPING || reference >= INPUTS_AT || SETTABLE[reference].is_tunable)
+        return fmi2OK;
+    return refuse_value(instance, reference, value, "fixed, can be set only before the end of initialisation");
 }
 
 static void store(Instance *instance, fmi2ValueReference reference, double value)
@@ -279,7 +296,7 @@ static void store(Instance *instance, fmi2ValueReference reference, double value
         instance->now.stale |= COEFFICIENTS_STALE | OUTPUTS_STALE;
 }
 
-/* Nothing is stored unless everything may be. */
+/* Nothing is stored unless everything may be; of several faults, that one is told which the Python kind tells. */
 #define SET(TYPE, KIND, CONVERTED)                                                                                         \
     fmi2Status fmi2Set##TYPE(fmi2Component component, const fmi2ValueReference references[], size_t count,                 \
                              const fmi2##TYPE values[])                                                                    \
@@ -287,7 +304,18 @@ static void store(Instance *instance, fmi2ValueReference reference, double value
         if (!component)                                                                                                    \
             return fmi2Error;                                                                                              \
         for (size_t i = 0; i < count; i++)                                                                                 \
-            if (allow(component, references[i], KIND, CONVERTED(values[i])) != fmi2OK)                                     \
+            if (find(component, references[i], KIND) != fmi2OK)                                                            \
+                return fmi2Error;                                                                                          \
+        for (size_t i = 0; i < count; i++)                                                                                 \
+            if (check_causality(component, references[i]) != fmi2OK)                                                       \
+                return fmi2Error;                                                                                          \
+        for (size_t i = 0; i < count; i++)                                                                                 \
+            if (check_value(component, references[i], CONVERTED(values[i])) != fmi2OK)                                     \
+                return fmi2Error;                                                                                          \
+        if (require(component, "setting values", INSTANTIATED, STEPPING) != fmi2OK)                                        \
+            return fmi2Error;                                                                                              \
+        for (size_t i = 0; i < count; i++)                                                                                 \
+            if (check_variability(component, references[i], CONVERTED(values[i])) != fmi2OK)                               \
                 return fmi2Error;                                                                                          \
         for (size_t i = 0; i < count; i++)                                                                                 \
             store(component, references[i], CONVERTED(values[i]));                                                         \

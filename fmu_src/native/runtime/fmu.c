@@ -4,6 +4,15 @@
 #define _CRT_SECURE_NO_WARNINGS
 #endif
 
+/* No rounding of a * b + c in one: compilers that find this file without our options would do it where they can. */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#elif defined(_MSC_VER)
+#pragma fp_contract(off)
+#endif
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdint.h>

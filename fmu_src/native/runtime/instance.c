@@ -31,12 +31,22 @@ typedef struct {
     int logs_events, logs_errors;
 } Instance;
 
+/* Text that was cut must not end within a character of UTF-8. */
+static void drop_last_character(char *text)
+{
+    size_t end = strlen(text);
+    while (end > 0 && ((unsigned char)text[end - 1] & 0xC0u) == 0x80u)
+        end--;
+    text[end > 0 ? end - 1 : 0] = '\0';
+}
+
 static void log_text(Instance *instance, fmi2Status status, const char *category, const char *format, va_list values)
 {
     char text[1024];
     if (!instance->logger)
         return;
-    vsnprintf(text, sizeof text, format, values);
+    if (vsnprintf(text, sizeof text, format, values) >= (int)sizeof text)
+        drop_last_character(text);
     instance->logger(instance->environment, instance->name, status, category, "%s", text);
 }
 
@@ -68,11 +78,23 @@ static fmi2Status refuse(Instance *instance, const char *format, ...)
 static const char *space(const char *unit) { return strcmp(unit, "1") ? " " : ""; }
 static const char *shown(const char *unit) { return strcmp(unit, "1") ? unit : ""; }
 
+/* A number as messages show it, the same on every platform. */
+static const char *written(double value, char digits[32])
+{
+    if (isnan(value))
+        return "nan";
+    if (isinf(value))
+        return value > 0.0 ? "inf" : "-inf";
+    snprintf(digits, 32, "%.15g", value);
+    return digits;
+}
+
 static fmi2Status refuse_value(Instance *instance, unsigned reference, double value, const char *why)
 {
     const Settable *settable = &SETTABLE[reference];
-    return refuse(instance, "%s.%s = %.15g%s%s: %s (allowed: %s)", instance->name, VARIABLE[reference].name, value,
-                  space(settable->unit), shown(settable->unit), why, settable->allowed);
+    char digits[32];
+    return refuse(instance, "%s.%s = %s%s%s: %s (allowed: %s)", instance->name, VARIABLE[reference].name,
+                  written(value, digits), space(settable->unit), shown(settable->unit), why, settable->allowed);
 }
 
 static int are_finite(const double *values, int count)
@@ -85,11 +107,12 @@ static int are_finite(const double *values, int count)
 
 static fmi2Status refuse_runaway(Instance *instance, int first, int count)
 {
+    char digits[32];
     int i = first;
     while (i < first + count - 1 && isfinite(instance->now.v[i]))
         i++;
-    return refuse(instance, "%s.%s = %g: the numbers ran away; look for parameters or inputs far from what the model "
-                  "is made for", instance->name, VARIABLE[i].name, instance->now.v[i]);
+    return refuse(instance, "%s.%s = %s: the numbers ran away; look for parameters or inputs far from what the model "
+                  "is made for", instance->name, VARIABLE[i].name, written(instance->now.v[i], digits));
 }
 
 /* --- parameters: rules, coefficients, clocks ---------------------------------------------------------------------- */
@@ -137,7 +160,7 @@ static void plan(Instance *instance, const Schedule *found, int is_beginning)
 {
     instance->seed = (uint64_t)found->seed;
     for (int i = 0; i < TASKS; i++) {
-        instance->every[i] = found->every[i] >= 1.0 ? (int64_t)found->every[i] : 1;
+        instance->every[i] = found->every[i] >= 1.0 ? (int64_t)fmin(found->every[i], 9007199254740992.0) : 1;
         instance->step[i] = chosen(&TASK[i], found->choice[i]);
     }
     for (int i = 0; i < CLOCKS; i++) {
@@ -267,10 +290,8 @@ static fmi2Status take_step(Instance *instance, double until)
 /* The instance as it is after fmi2Instantiate. */
 static void begin_anew(Instance *instance)
 {
-    const double refused = instance->now.v[REFUSED_AT];
     memset(&instance->now, 0, sizeof instance->now);
     for (int i = 0; i < OUTPUTS_AT; i++)
         instance->now.v[i] = SETTABLE[i].start;
-    instance->now.v[REFUSED_AT] = refused;
     instance->now.stale = EVERYTHING_STALE;
 }

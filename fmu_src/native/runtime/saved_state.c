@@ -30,25 +30,37 @@ static void save(const Instance *instance, SavedState *saved)
     saved->moment = instance->now;
 }
 
+/* Whether a number can be the value of a parameter or input. */
+static int fits(int reference, double value)
+{
+    const Settable *settable = &SETTABLE[reference];
+    return settable->low <= value && value <= settable->high &&
+           (VARIABLE[reference].type == REAL || (value == floor(value) && fabs(value) <= 2147483647.0));
+}
+
 static int is_in_range(const Moment *moment)
 {
     for (int i = 0; i < OUTPUTS_AT; i++)
-        if (!(SETTABLE[i].low <= moment->v[i] && moment->v[i] <= SETTABLE[i].high))
+        if (!fits(i, moment->v[i]))
             return 0;
     for (int i = 0; i < CLOCKS; i++)
         if (moment->ticks[i] < 0 || moment->ticks[i] > (int64_t)1 << 53)
             return 0;
-    return are_finite(moment->v, VARIABLES) && are_finite(moment->slope, INPUTS) && INSTANTIATED <= moment->stage &&
-           moment->stage <= TERMINATED && fabs(moment->start_time) <= LATEST_TIME && fabs(moment->time) <= LATEST_TIME;
+    return INSTANTIATED <= moment->stage && moment->stage <= TERMINATED &&
+           (moment->stage < STEPPING ? moment->time == moment->start_time : are_finite(moment->v + STATE_AT, STATES)) &&
+           are_finite(moment->slope, INPUTS) && fabs(moment->start_time) <= LATEST_TIME &&
+           fabs(moment->time) <= LATEST_TIME;
 }
 
-/* What the clocks and tasks of a moment are; calculates its coefficients anew. */
+/* What the clocks and tasks of a moment are; calculates its coefficients anew. A clock that lags behind would keep the
+   next step busy for ever. */
 static int find_schedule(Moment *moment, Schedule *found)
 {
     coefficients(moment->v, NULL);
     schedule(moment->v, (double *)found);
     for (int i = 0; i < CLOCKS; i++)
-        if (!(found->period[i] >= SHORTEST_PERIOD))
+        if (!(found->period[i] >= SHORTEST_PERIOD &&
+              moment->start_time + (double)(moment->ticks[i] + 1) * found->period[i] > moment->time))
             return 0;
     return 1;
 }
@@ -63,11 +75,12 @@ static const char *restore(Instance *instance, const SavedState *saved)
     if (saved->fingerprint[0] != FINGERPRINT_0 || saved->fingerprint[1] != FINGERPRINT_1 || saved->size != sizeof *saved)
         return "another FMU or version saved it";
     moment = saved->moment;
-    if (!is_in_range(&moment) || (moment.stage >= STEPPING && !find_schedule(&moment, &found)))
+    if (!is_in_range(&moment) || (moment.stage == STEPPING && !find_schedule(&moment, &found)))
         return "it is damaged";
     moment.v[REFUSED_AT] = instance->now.v[REFUSED_AT];
     instance->now = moment;
-    if (moment.stage >= STEPPING)
+    instance->now.stale |= moment.stage < STEPPING ? EVERYTHING_STALE : COEFFICIENTS_STALE | OUTPUTS_STALE;
+    if (moment.stage == STEPPING)
         plan(instance, &found, 1);
     return NULL;
 }

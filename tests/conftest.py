@@ -1,0 +1,1 @@
+"""Puts this folder on the path, so that every room's tests find the helpers in it."""

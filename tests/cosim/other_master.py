@@ -1,0 +1,100 @@
+"""Runs an .ssp file in a master that is not ours, in a process of its own, because such a master may take it down.
+
+``python other_master.py libcosim|ecos <task as JSON>``; the task names the .ssp file, the step (s) and how many, what
+to read (name and kind), what to set before which step, and the .npy file to write: a row for each communication point.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+NOT_INSTALLED = 77
+
+
+class LibCosim:
+    """Its values can be read from the first step on."""
+
+    first = 1
+
+    def __init__(self, ssp: str, parameter_set: str, step: float) -> None:
+        from libcosimpy.CosimExecution import CosimExecution
+        from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+        from libcosimpy.CosimObserver import CosimObserver
+
+        log_output_level(CosimLogLevel.WARNING)
+        self.execution = CosimExecution.from_ssp_file(ssp_path=ssp, step_size=round(step * 1e9))
+        self.observer = CosimObserver.create_last_value()
+        self.execution.add_observer(self.observer)
+
+    def reader(self, name: str, kind: str) -> Callable[[], float]:
+        """A function that reads an output."""
+        component, variable = name.split(".", 1)
+        index = self.execution.slave_index_from_instance_name(component)
+        references = {one.name.decode(): one.reference for one in self.execution.slave_variables(index)}
+        read = getattr(self.observer, f"last_{kind.lower()}_values")
+        return lambda: float(read(index, [references[variable]])[0])
+
+    def step(self, count: int = 1) -> None:
+        assert self.execution.step(count)
+
+
+class Ecos:
+    """It takes no notice of an FMU's status."""
+
+    first = 0
+
+    def __init__(self, ssp: str, parameter_set: str, step: float) -> None:
+        from ecospy import EcosSimulation
+
+        self.simulation = EcosSimulation(ssp_path=ssp, step_size=step)
+        assert self.simulation.init(parameter_set=parameter_set)
+
+    def reader(self, name: str, kind: str) -> Callable[[], float]:
+        """A function that reads an output."""
+        read = getattr(self.simulation, {"Real": "get_real", "Integer": "get_integer", "Boolean": "get_bool"}[kind])
+        identifier = name.replace(".", "::", 1)
+        return lambda: float(read(identifier))
+
+    def set_real(self, name: str, value: float) -> None:
+        self.simulation.set_real(name.replace(".", "::", 1), value)
+
+    def step(self, count: int = 1) -> None:
+        self.simulation.step(count)
+
+
+MASTERS: dict[str, Any] = {"libcosim": LibCosim, "ecos": Ecos}
+
+
+def rows(master: Any, task: dict[str, Any]) -> Iterator[list[float]]:
+    """What is read at each communication point; NaN where the master cannot tell yet."""
+    readers = [master.reader(name, kind) for name, kind in task["read"]]
+    for point in range(task["steps"] + 1):
+        if point:
+            for name, value in task["set"].get(str(point), []):
+                master.set_real(name, value)
+            master.step()
+        yield [read() if point >= master.first else np.nan for read in readers]
+
+
+def main() -> None:
+    """Do the task; then tell the time (s) of a step."""
+    task = json.loads(sys.argv[2])
+    try:
+        master = MASTERS[sys.argv[1]](task["ssp"], task["parameter_set"], task["step"])
+    except (ImportError, OSError) as error:  # also a shared library that the package needs
+        print(error, file=sys.stderr)
+        sys.exit(NOT_INSTALLED)
+    np.save(task["results"], np.array(list(rows(master, task))))
+    began = time.perf_counter()
+    master.step(1000)
+    print(f"time of a step: {(time.perf_counter() - began) / 1000:.3g} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""Random records for tests: legal values near given ones, and numbers to the last bit."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+from attitude_fmu.models.errors import ValueRefusedError
+from attitude_fmu.models.record import Boolean, Enumeration, Integer, Leaf, Real, defaults, flatten, leaves, unflatten
+from attitude_fmu.models.system import Model, check_rules
+
+COUNTERS = {
+    "ticks": (0, 1, 7, 4999, 5001, 5008, 5012, 5063, 9998, 10_003, 123_456),
+    "wind.calls": (0, 1, 500),
+    "engaged": (0, 1),
+    "attitude.alignment.samples": (0, 10, 999, 1000, 1001),
+    "attitude.fusion.rest.quiet": (0.0, 1.0, 1.6, 4.0),
+    "accelerometer.samples": (0, 4, 5, 7),
+}
+"""Values that reach every branch: start, shutter and knock, end of the alignment, rest, a due word."""
+
+NEVER_WILD = ("attitude.q_nb", "attitude.fusion.covariance")
+"""What no run can bring to zero or to a hundred times itself."""
+
+
+def near(leaf: Leaf, value: float, chance: random.Random) -> float:
+    """A random legal value near `value`."""
+    fact = leaf.fact
+    if isinstance(fact, Enumeration):
+        return chance.randint(1, len(fact.items))
+    if isinstance(fact, Boolean):
+        return chance.randint(0, 1)
+    if leaf.name in COUNTERS:
+        return chance.choice(COUNTERS[leaf.name])
+    if isinstance(fact, Integer):
+        return value
+    assert isinstance(fact, Real)
+    low = fact.min if fact.min is not None else -float("inf")
+    high = fact.max if fact.max is not None else float("inf")
+    wild = chance.random()
+    if wild < 0.1 and not leaf.name.startswith(NEVER_WILD):
+        moved = 0.0 if wild < 0.05 else 100.0 * value
+    else:
+        moved = value * (1.0 + 0.1 * chance.gauss(0.0, 1.0)) + (0.001 * chance.gauss(0.0, 1.0) if value == 0.0 else 0.0)
+    return min(max(moved, low), high)
+
+
+def settable_near(leaf: Leaf, value: float, chance: random.Random) -> float:
+    """A random legal value of a parameter or input, near `value`; whole numbers move as well."""
+    if not isinstance(leaf.fact, Integer):
+        return near(leaf, value, chance)
+    low = value - 9 if leaf.fact.min is None else max(leaf.fact.min, value - 9)
+    high = value + 9 if leaf.fact.max is None else min(leaf.fact.max, value + 9)
+    return chance.randint(int(low), int(high))
+
+
+def points_near(record: type, centre: Any, chance: random.Random) -> list[float]:
+    return [float(near(leaf, value, chance)) for leaf, value in zip(leaves(record), flatten(centre), strict=True)]
+
+
+def bits(values: list[float]) -> list[str]:
+    return [float(value).hex() for value in values]
+
+
+def legal_parameters(model: Model, chance: random.Random) -> list[float]:
+    """Random parameters that go together."""
+    while True:
+        parameters = points_near(model.Parameters, defaults(model.Parameters), chance)
+        try:
+            check_rules(model, unflatten(model.Parameters, parameters), model.name)
+        except ValueRefusedError:
+            continue
+        return parameters
