@@ -170,6 +170,59 @@ def info(
         show_info(what, dist, _kind(what, fmu), pattern, everything)
 
 
+SENSOR_HELP = """Measure a modelled sensor and compare it with its datasheet.
+
+DEVICE is one of the parts that the attitude sensor can be: ADXRS450_ADXL355, ADXRS453_ADXL355, ADIS16354_300, \
+ADIS16354_150, ADIS16354_75 and more. Everything is measured on the native FMU itself: Allan deviation, \
+noise spectrum, frequency response at every setting of the filters, step response, calibration, temperature drift and \
+register codes.
+
+Written into the output folder: \
+gyro.png and accelerometer.png (the pictures), \
+characteristics.csv (the table that is shown: datasheet, modelled part, verdict, source).
+
+[bold]Examples[/bold]
+
+  attitude-fmu sensor ADXRS450_ADXL355
+
+  attitude-fmu sensor ADIS16354_300 --quick --out adis
+
+  attitude-fmu sensor ADXRS450_ADXL355 --specimen 7
+
+  attitude-fmu sensor ADXRS450_ADXL355 --set accelerometer.output_data_rate=125_Hz --set seed=3
+
+[bold]attitude-fmu info static[/bold] lists the sensor's parameters; --set takes them without the component's name.
+"""
+
+
+@application.command("sensor", help=SENSOR_HELP)
+def sensor_command(
+    device: Annotated[str, typer.Argument(help="The parts to measure.", metavar="DEVICE")],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for pictures and table; made if missing.")] = Path(
+        "out"
+    ),
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Short records and the chosen filter settings only: a few seconds.")
+    ] = False,
+    specimen: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Which piece of all that the tolerances allow; 0: the nominal one.")
+    ] = 1,
+    values: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the sensor, in SI units. Repeatable."),
+    ] = None,
+    dist: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder of the FMU, which is built where missing or stale.")
+    ] = Path("dist"),
+) -> None:
+    """Measure a modelled sensor and compare it with its datasheet."""
+    with _reported():
+        from .sensor import SensorRequest, show_sensor
+
+        settings = _settings(values or [], "write it as parameter=value, for instance seed=7", dotted=False)
+        show_sensor(SensorRequest(device, out, quick, specimen, settings, dist))
+
+
 def _show_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"attitude-fmu {version('attitude-fmu')}")
@@ -196,12 +249,15 @@ def _kind(what: str, fmu: Kind | None) -> Kind:
     return fmu or "native"
 
 
-def _settings(texts: list[str]) -> dict[str, str]:
+_SETTING = "write it as component.variable=value, for instance sensor.seed=7"
+
+
+def _settings(texts: list[str], how: str = _SETTING, *, dotted: bool = True) -> dict[str, str]:
     settings: dict[str, str] = {}
     for text in texts:
         name, equals, value = text.partition("=")
-        if not equals or "." not in name:
-            _refuse_usage(f"--set {text}: write it as component.variable=value, for instance sensor.seed=7")
+        if not equals or (dotted and "." not in name):
+            _refuse_usage(f"--set {text}: {how}")
         settings[name.strip()] = value.strip()
     return settings
 

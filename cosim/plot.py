@@ -30,7 +30,7 @@ _MOST_VARIABLES = 12
 _SEGMENT = 4.0
 """s, length of the pieces that the spectrum averages over."""
 
-_STYLE: Any = {
+STYLE: Any = {
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.titleweight": "bold",
@@ -76,7 +76,7 @@ def plot(path: Path, picture: Picture) -> Path:
     from matplotlib.figure import Figure
 
     numbers = picture.numbers
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         if numbers.jitter is not None and picture.roles.truth is not None and numbers.aligned is not None:
             figure = Figure(figsize=(12.0, 9.0), dpi=150)
             _gimbal(figure, picture)

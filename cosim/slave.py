@@ -57,7 +57,7 @@ class Feed(NamedTuple):
 
 
 class Slave:
-    """One instance of an FMU.
+    """One instance of an FMU, which is unpacked in the folder unless it lies there already.
 
     What it logs is kept for the message that explains a failure.
     """
@@ -75,7 +75,8 @@ class Slave:
         self.gets: list[Call] = []
         self.feeds: list[Feed] = []
         try:
-            fmpy.extract(str(component.fmu), unzipdir=str(folder))
+            if not (folder / "modelDescription.xml").is_file():
+                fmpy.extract(str(component.fmu), unzipdir=str(folder))
             self.fmu = self._instance(folder)
         except Exception as error:  # FMPy raises bare Exception
             del _listening[self.number]

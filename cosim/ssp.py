@@ -73,7 +73,7 @@ def write_ssp(system: System, path: Path) -> Path:
     parameter_sets = _sets_by_component(system, interfaces)
     members = {_STRUCTURE: _structure(system, interfaces, resources, parameter_sets)}
     for component, (name, source, values) in parameter_sets.items():
-        members[source] = _parameter_set(name, values, interfaces[component].variables)
+        members[source] = _parameter_set(name, values, interfaces[component].variables, {})
     for fmu, source in resources.items():
         members[source] = fmu.read_bytes()
     with whole_or_not(path) as draft, zipfile.ZipFile(draft, "w") as archive:
@@ -87,17 +87,19 @@ def write_ssp(system: System, path: Path) -> Path:
 
 
 def write_ssv(parameters: ParameterSet, path: Path, interfaces: Mapping[str, Interface]) -> Path:
-    """Write a parameter set with names ``component.variable`` as an ``.ssv`` file.
+    """Write a parameter set with names ``component.variable`` as an ``.ssv`` file, with the units that it gives.
+
+    Under the component ``""`` names are those of the FMU, as a set that is bound to a component has them.
 
     Raises `ResultsError` if the file cannot be written.
     """
     variables = {
-        f"{component}.{name}": variable
+        f"{component}.{name}" if component else name: variable
         for component, interface in interfaces.items()
         for name, variable in interface.variables.items()
     }
     with whole_or_not(path) as draft:
-        draft.write_bytes(_parameter_set(parameters.name, parameters.values, variables))
+        draft.write_bytes(_parameter_set(parameters.name, parameters.values, variables, parameters.units))
     return path
 
 
@@ -236,7 +238,11 @@ def _add_units(root: Any, shown: list[tuple[Variable, Interface]]) -> None:
     used = {v.unit: interface.units.get(v.unit) for v, interface in shown if v.type == "Real" and v.unit}
     if not used:
         return
-    parent = _add(root, "ssd:Units")
+    _add_unit_list(root, "ssd:Units", used)
+
+
+def _add_unit_list(root: Any, tag: str, used: Mapping[str, Unit | None]) -> None:
+    parent = _add(root, tag)
     for name, unit in sorted(used.items()):
         base = _add(_add(parent, "ssc:Unit", name=name), "ssc:BaseUnit")
         if unit is None:
@@ -250,7 +256,9 @@ def _add_units(root: Any, shown: list[tuple[Variable, Interface]]) -> None:
             base.set("offset", repr(unit.offset))
 
 
-def _parameter_set(name: str, values: Mapping[str, Value], variables: Mapping[str, Variable]) -> bytes:
+def _parameter_set(
+    name: str, values: Mapping[str, Value], variables: Mapping[str, Variable], units: Mapping[str, Unit]
+) -> bytes:
     prefixes = {"ssv": SSV, "ssc": SSC}
     root = etree.Element(_tag("ssv:ParameterSet"), {"version": "1.0", "name": name}, prefixes)
     parameters = _add(root, "ssv:Parameters")
@@ -261,7 +269,11 @@ def _parameter_set(name: str, values: Mapping[str, Value], variables: Mapping[st
             parameter.set("description", about)
         # by number: libcosim and FMPy do not take the name of an enumeration's item
         kind = "Integer" if variable.type == "Enumeration" else variable.type
-        _add(parameter, f"ssv:{kind}", value=_text(variable, value))
+        typed = _add(parameter, f"ssv:{kind}", value=_text(variable, value))
+        if key in units:
+            typed.set("unit", units[key].name)
+    if units:
+        _add_unit_list(root, "ssv:Units", {unit.name: unit for unit in units.values()})
     return _to_bytes(root)
 
 

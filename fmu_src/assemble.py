@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import importlib
 import sys
 import tempfile
 import zipfile
@@ -14,9 +13,8 @@ from pathlib import Path
 from pythonfmu import FmuBuilder  # type: ignore[import-untyped]
 
 from ..models.errors import AttitudeFmuError
-from ..models.system import Model
 from .build import Order
-from .catalogue import Entry
+from .catalogue import Entry, model_of
 from .description import build_description, model_description
 from .documentation import external_dependencies, index_page
 from .native.c_code import model_source
@@ -92,9 +90,8 @@ def pack(content: dict[str, bytes], archive: Path) -> None:
 
 def assemble(order: Order, archive: Path) -> None:
     """Make one FMU and write it to `archive`."""
-    model: Model = importlib.import_module(order.entry.module).MODEL
     fingerprint = fingerprint_of(order.entry, order.kind)
-    traced = trace(model)
+    traced = trace(model_of(order.entry))
     common = _common_content(order, traced, fingerprint)
     own = _python_content(order.entry) if order.kind == "python" else _native_content(order, traced, fingerprint)
     pack({**own, **common}, archive)

@@ -13,12 +13,12 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
-from .catalogue import CATALOGUE, Entry, Kind
+from .catalogue import CATALOGUE, Entry, Kind, with_device
 from .catalogue import entry as entry_called
 from .errors import BuildError
 from .native.compile import PLATFORMS, host_platform
@@ -46,15 +46,24 @@ class Order(NamedTuple):
     def from_json(cls, text: str) -> Order:
         """The order that `to_json` wrote."""
         entry, kind, platforms = json.loads(text)
-        return cls(Entry(*entry), kind, tuple(platforms))
+        whole = Entry(*entry)
+        starts = tuple((name, value) for name, value in whole.starts)
+        return cls(whole._replace(starts=starts), kind, tuple(platforms))
 
 
 def _quiet(_identifier: str, _event: str) -> None:
     return None
 
 
-def _entry(which: str | Entry) -> Entry:
-    return entry_called(which) if isinstance(which, str) else which
+def _entry(
+    which: str | Entry, device: str | None = None, specimen: int = 0, values: Mapping[str, float] | None = None
+) -> Entry:
+    entry = entry_called(which) if isinstance(which, str) else which
+    if device is not None:
+        return with_device(entry, device, specimen, values)
+    if specimen:
+        raise BuildError(f"specimen {specimen} of which device? Name one, such as {entry.device or 'AttitudeSensor'}")
+    return entry._replace(starts=tuple({**dict(entry.starts), **values}.items())) if values else entry
 
 
 def folder_of(dist: Path, kind: Kind) -> Path:
@@ -92,9 +101,22 @@ def _assembled(entry: Entry, kind: Kind, platforms: Platforms, archive: Path) ->
         raise BuildError(f"{entry.identifier} could not be built:\n{(done.stderr or done.stdout).strip()}")
 
 
-def build(which: str | Entry, dist: Path, kind: Kind = "native", platforms: Platforms = "host") -> Path:
-    """Build one FMU into the folder `dist`; a file of the same name is replaced whole or not at all."""
-    entry = _entry(which)
+def build(
+    which: str | Entry,
+    dist: Path,
+    kind: Kind = "native",
+    platforms: Platforms = "host",
+    *,
+    device: str | None = None,
+    specimen: int = 0,
+    values: Mapping[str, float] | None = None,
+) -> Path:
+    """Build one FMU into the folder `dist`; a file of the same name is replaced whole or not at all.
+
+    A sensor starts with the parameters of a `device` and of one `specimen` of it, if named (`with_device`), and any
+    model with other `values`.
+    """
+    entry = _entry(which, device, specimen, values)
     folder = folder_of(dist, kind)
     target = folder / f"{entry.identifier}.fmu"
     try:

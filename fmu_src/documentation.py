@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import html
 import re
+from collections.abc import Mapping
 
 from ..models.record import Boolean, Enumeration, Real, allowed
+from ..models.sensors.datasheet import CONFIDENCE, READINGS, UNSURE, Origin, Tolerance
+from ..models.sensors.devices import DEVICES, origins, parameters
 from ..models.system import Model
 from .catalogue import Entry, Kind
 from .interface import Variable, interface_of
@@ -109,21 +112,27 @@ def _values(variable: Variable) -> list[str]:
     return [re.sub(rf" {re.escape(fact.unit)}(?= or |$)", "", allowed(fact)).replace("any finite number", "any")]
 
 
-def _row(variable: Variable, description: str) -> str:
+def _row(variable: Variable, description: str, source: list[str]) -> str:
     cells = (
         [variable.name],
         [_unit(variable)],
         [_start(variable)],
         _values(variable),
         [variable.variability],
+        *([source] if source else []),
         [description],
     )
     return "<tr>" + "".join(f"<td>{'<br>'.join(map(html.escape, cell))}</td>" for cell in cells) + "</tr>"
 
 
-def _table(described: list[tuple[Variable, str]]) -> str:
-    head = "".join(f"<th>{name}</th>" for name in ("name", "unit", "start", "values", "variability", "meaning"))
-    rows = "\n".join(_row(variable, description) for variable, description in described)
+def _table(described: list[tuple[Variable, str]], sources: Mapping[str, str]) -> str:
+    has_sources = any(variable.name in sources for variable, _ in described)
+    names = ("name", "unit", "start", "values", "variability", *(["source"] if has_sources else []), "meaning")
+    head = "".join(f"<th>{name}</th>" for name in names)
+    rows = "\n".join(
+        _row(variable, description, [sources.get(variable.name, "")] if has_sources else [])
+        for variable, description in described
+    )
     return f"<table>\n<tr>{head}</tr>\n{rows}\n</table>\n"
 
 
@@ -136,19 +145,66 @@ def _by_record(described: list[tuple[Variable, str]], prefix: str) -> dict[str, 
     return {record: group for record, group in groups.items() if group}
 
 
-def _section(title: str, described: list[tuple[Variable, str]], prefix: str | None) -> str:
+def _section(title: str, described: list[tuple[Variable, str]], prefix: str | None, sources: Mapping[str, str]) -> str:
     """One heading with its table, or with a table for each record if a prefix of the names is given."""
     if not described:
         return ""
     groups = {"": described} if prefix is None else _by_record(described, prefix)
-    tables = ((f"<h3>{record}</h3>\n" if record else "") + _table(group) for record, group in groups.items())
+    tables = ((f"<h3>{record}</h3>\n" if record else "") + _table(group, sources) for record, group in groups.items())
     return f"<h2>{title}</h2>\n{''.join(tables)}"
+
+
+_UNSURE_MARK = "(?)"
+"""Before a number that the part's own sheet may contradict."""
+
+
+def _source(variable: Variable, origin: Origin, nominal: float) -> str:
+    is_piece = isinstance(origin, Tolerance)
+    if not is_piece and variable.start != nominal:
+        return "chosen when this FMU was built"
+    mark = f"{_UNSURE_MARK} " if origin.confidence in UNSURE else ""
+    number = f"this piece's; all pieces: {origin.text}" if is_piece and variable.start else origin.text
+    return f"{mark}{number}: {origin.source} [{origin.confidence}]"
+
+
+def _sources(entry: Entry, variables: tuple[Variable, ...]) -> dict[str, str]:
+    """Where the parameters' start values come from and how sure they are, by name; for sensors only."""
+    if not entry.device:
+        return {}
+    found, nominal = origins(entry.device), parameters(entry.device)
+    return {
+        variable.name: _source(variable, found[variable.name], nominal[variable.name])
+        for variable in variables
+        if variable.name in found
+    }
+
+
+def _legend(entry: Entry) -> str:
+    """What the column with the sources says."""
+    if not entry.device:
+        return ""
+    kinds = "".join(
+        f"<li>{f'{_UNSURE_MARK} ' if name in UNSURE else ''}<b>{name}</b>: {html.escape(meaning)}</li>\n"
+        for name, meaning in CONFIDENCE.items()
+    )
+    readings = "".join(f"<li><b>{name}</b>: {html.escape(meaning)}</li>\n" for name, meaning in READINGS.items())
+    return f"""<h2>Sources of the parts' numbers</h2>
+<p>Parameters of the parts ({html.escape(DEVICES[entry.device].description)}) show in the column "source" the number as
+the datasheet has it, where it stands, and in brackets how sure it is. {_UNSURE_MARK} marks what the part's own sheet
+may contradict.</p>
+<ul>
+{kinds}</ul>
+<p>What differs from piece to piece has a tolerance, which a specimen is drawn from as it says:</p>
+<ul>
+{readings}</ul>
+"""
 
 
 def index_page(model: Model, entry: Entry, kind: Kind, version: str) -> str:
     """documentation/index.html: conventions, errors, and every variable with unit, range and meaning."""
     interface = interface_of(model)
     described = list(zip(interface.shown, descriptions(interface.shown), strict=True))
+    table_sources = _sources(entry, interface.variables)
     sections = (
         ("Inputs", "input", None),
         ("Outputs", "output", None),
@@ -157,7 +213,7 @@ def index_page(model: Model, entry: Entry, kind: Kind, version: str) -> str:
         ("State", "local", "state."),
     )
     tables = "".join(
-        _section(heading, [pair for pair in described if pair[0].causality == causality], prefix)
+        _section(heading, [pair for pair in described if pair[0].causality == causality], prefix, table_sources)
         for heading, causality, prefix in sections
     )
     title = html.escape(model.name)
@@ -175,6 +231,6 @@ def index_page(model: Model, entry: Entry, kind: Kind, version: str) -> str:
 results at common times for the same inputs. {_SOURCES[kind]}</p>
 <h2>Errors</h2>
 <p>{_ERRORS.format(refusal=_REFUSAL[kind])}</p>
-{tables}</body>
+{_legend(entry)}{tables}</body>
 </html>
 """

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import pythonfmu  # type: ignore[import-untyped]
 
+from ..models.sensors.devices import origins
 from .catalogue import Entry, Kind
 from .errors import BuildError
 
@@ -134,7 +135,8 @@ def _model_files(entry: Entry) -> dict[str, Path]:
 def fingerprint_of(entry: Entry, kind: Kind) -> str:
     """Hash of everything that an FMU is made of, as it is on disk now."""
     tools = [_version_of(tool) for tool in _TOOLS[kind]]
-    digest = hashlib.sha256(repr((kind, tuple(entry), version(), license_of(), tools)).encode())
+    sheets = origins(entry.device) if entry.device else {}
+    digest = hashlib.sha256(repr((kind, tuple(entry), sheets, version(), license_of(), tools)).encode())
     for name, path in [*sorted(_model_files(entry).items()), *_build_files(kind)]:
         content = path.read_bytes()
         digest.update(f"{name}\0{len(content)}\0".encode())
@@ -150,14 +152,22 @@ def guid_of(fingerprint: str) -> str:
 
 def _slave_file(entry: Entry, package: str, fingerprint: str) -> str:
     module = f"{package}.{entry.module.removeprefix(f'{_PACKAGE}.')}"
+    model, starts = "MODEL", ""
+    if entry.starts:
+        rows = "".join(f"    {name!r}: {value!r},\n" for name, value in entry.starts)
+        model, starts = (
+            "MODEL._replace(Parameters=with_defaults(MODEL.Parameters, STARTS))",
+            f"\nSTARTS = {{\n{rows}}}\n",
+        )
     return f'''"""{entry.identifier}: what pythonfmu loads. The model is {module.replace(".", "/")}.py."""
 
 from {package}.fmu_src.slave import ModelSlave
+from {package}.models.record import with_defaults
 from {module} import MODEL
-
+{starts}
 
 class {entry.identifier}(ModelSlave):
-    model = MODEL
+    model = {model}
     fingerprint = "{fingerprint}"
 
     def __init__(self, **arguments):  # the wrapper needs a method here: see fmu_src/slave.py

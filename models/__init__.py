@@ -2,7 +2,7 @@
 
 Conventions, obeyed everywhere
 ------------------------------
-Units are SI: rad, rad/s, m/s^2, K, s, N.m. Datasheet units appear in `sensors.devices` alone.
+Units are SI: rad, rad/s, m/s^2, K, s, N.m. Datasheet units appear in the `sheet` modules of `sensors` alone.
 
 Frames: n is east, north, up; b is right, forward, up of the body that carries the sensor.
 Yaw (psi) is clockwise from north seen from above, pitch (theta) nose up, roll (gamma) right side down;

@@ -39,7 +39,7 @@ from .sensors import accelerometer as accelerometers
 from .sensors import adis16354_words as adis16354
 from .sensors import adxl355_registers as adxl355
 from .sensors import adxrs450_frame as adxrs450
-from .sensors import bias_instability, devices
+from .sensors import bias_instability
 from .sensors import gyro as gyros
 from .sensors.accelerometer import (
     ACCELEROMETER_FILTER,
@@ -47,6 +47,8 @@ from .sensors.accelerometer import (
     AccelerometerParameters,
     AccelerometerState,
 )
+from .sensors.board import BOARD
+from .sensors.datasheet import REFERENCE_TEMPERATURE
 from .sensors.digital_filter import TAPS, DelayLines
 from .sensors.faults import FAULT, FaultParameters, is_active
 from .sensors.gyro import GYRO_FILTER, GyroCoefficients, GyroParameters, GyroState
@@ -112,7 +114,7 @@ class ProcessorParameters(NamedTuple):
 
     period: Annotated[float, Real("s", "nominal time between readings of the registers", min=1e-4, max=10.0)] = 0.002
     clock_error: Annotated[float, Real("1", "relative error of the timer's frequency", min=-0.05, max=0.05)] = (
-        devices.BOARD.processor_clock_error
+        BOARD.processor_clock_error
     )
 
 
@@ -228,7 +230,7 @@ class Inputs(NamedTuple):
         Vector3, Real("rad/s2", "true angular acceleration, wanted for a lever arm only")
     ] = ZERO3
     temperature: Annotated[float, Real("K", "ambient temperature", min=200.0, max=450.0, display="degC")] = (
-        devices.REFERENCE_TEMPERATURE
+        REFERENCE_TEMPERATURE
     )
     supply_voltage: Annotated[float, Real("V", "voltage that feeds the parts", min=0.0, max=60.0)] = 5.0
     heading_aid: Annotated[float, Real("rad", "outside yaw, used once at the end of the alignment", display="deg")] = (
@@ -480,8 +482,8 @@ def _with_gyro(state: State, axis: int, gyro: GyroState) -> State:
 TaskStep = Callable[[State, Inputs, Parameters, Coefficients, tuple[Any, ...]], State]
 
 
-def _gyro_sense(axis: int) -> TaskStep:
-    sense = gyros.sense(axis)
+def _gyro_sense(axis: int, kind: Callable[[int], gyros.Sense]) -> TaskStep:
+    sense = kind(axis)
 
     def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
         factor = state.slow.gyro_scale[axis]
@@ -505,20 +507,9 @@ def _gyro_register(axis: int) -> TaskStep:
 def _gyro_sample(axis: int, taps: int) -> TaskStep:
     sample = gyros.sample(axis, taps)
 
-    def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, draws: tuple[Any, ...]) -> State:
-        slow, lines = state.slow, state.gyro_lines
-        gyro, after = sample(
-            state.gyro[axis],
-            lines[axis],
-            inputs.rate,
-            inputs.specific_force,
-            slow.gyro_scale[axis],
-            slow.gyro_offset[axis],
-            p.gyro,
-            k.gyro,
-            p.fault,
-            draws,
-        )
+    def step(state: State, _inputs: Inputs, p: Parameters, k: Coefficients, draws: tuple[Any, ...]) -> State:
+        lines, offset = state.gyro_lines, state.slow.gyro_offset[axis]
+        gyro, after = sample(state.gyro[axis], lines[axis], offset, p.gyro, k.gyro, p.fault, draws)
         replaced = (
             (after, *lines[1:]) if axis == 0 else (lines[0], after, lines[2]) if axis == 1 else (*lines[:2], after)
         )
@@ -527,13 +518,13 @@ def _gyro_sample(axis: int, taps: int) -> TaskStep:
     return step
 
 
-def accelerometer_sense(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
-    """The decimating accelerometer takes an input sample."""
-    factor = state.slow.accelerometer_scale
-    part = accelerometers.sense(
-        state.accelerometer, _force_at_part(inputs, p), factor, p.accelerometer, k.accelerometer
-    )
-    return State(state.gyro, part, *state[2:])
+def _accelerometer_sense(sense: accelerometers.Sense) -> TaskStep:
+    def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
+        factor = state.slow.accelerometer_scale
+        part = sense(state.accelerometer, _force_at_part(inputs, p), factor, p.accelerometer, k.accelerometer)
+        return State(state.gyro, part, *state[2:])
+
+    return step
 
 
 def accelerometer_register(
@@ -549,12 +540,10 @@ def accelerometer_register(
 def _accelerometer_sample(taps: int) -> TaskStep:
     sample = accelerometers.sample(taps)
 
-    def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, draws: tuple[Any, ...]) -> State:
+    def step(state: State, _inputs: Inputs, p: Parameters, k: Coefficients, draws: tuple[Any, ...]) -> State:
         part, lines = sample(
             state.accelerometer,
             state.accelerometer_lines,
-            _force_at_part(inputs, p),
-            state.slow.accelerometer_scale,
             state.slow.accelerometer_offset,
             p.accelerometer,
             k.accelerometer,
@@ -700,8 +689,9 @@ def acquire(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws
     fresh = [words[i] - before.gyro_words[i] for i in range(3)]
     fresh.append(state.accelerometer.words - before.accelerometer_words)
     repeated, missed = before.repeated, before.missed
+    real = where(p.ideal > 0.5, 0.0, 1.0)
     for count in fresh:
-        repeated = repeated + where(count < 0.5, 1.0, 0.0)
+        repeated = repeated + where(count < 0.5, real, 0.0)
         missed = missed + maximum(count - 1.0, 0.0)
     reading = ReadingState(
         each_axis(lambda i: where(_lost(i, p, time) > 0.5, before.rate[i], read.rate[i])),
@@ -740,17 +730,24 @@ class _Start(NamedTuple):
 
 
 def _aligning(
-    attitude: AttitudeState, reading: ReadingState, inputs: Inputs, p: Parameters, k: Coefficients
+    attitude: AttitudeState,
+    reading: ReadingState,
+    nulled_parts: Scalar,
+    inputs: Inputs,
+    p: Parameters,
+    k: Coefficients,
 ) -> tuple[_Start, Scalar]:
-    """The start of the solution after one more reading at rest, and 1.0 once there are enough."""
-    watched = with_watched_sample(
-        attitude.alignment, reading.specific_force, reading.rate, p.motion, p.processor.period
-    )
+    """The start of the solution after one more reading at rest, and 1.0 once there are enough.
+
+    Readings count from when the parts have ended their own bias null.
+    """
+    seen = with_watched_sample(attitude.alignment, reading.specific_force, reading.rate, p.motion, p.processor.period)
+    watched = choose(nulled_parts > 0.5, seen, attitude.alignment)
     alignment = watched.sums
     q_nb = levelled(alignment.specific_force, inputs.heading_aid)
     done = where(alignment.samples > k.alignment_samples - 0.5, 1.0, 0.0)
     nulled, found = nulled_bias(alignment, q_nb, p.latitude, p.alignment)
-    mean = 1.0 / alignment.samples
+    mean = 1.0 / maximum(alignment.samples, 1.0)
     rest = RestState(scale(mean, alignment.rate), scale(mean, alignment.specific_force), p.alignment.duration)
     fusion = p.solver.fusion
     fused = initial_fusion(
@@ -804,7 +801,9 @@ def _fused(attitude: AttitudeState, signal: _Read, p: Parameters) -> Solution:
 def _solver(running: Solver) -> TaskStep:
     def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
         attitude = state.attitude
-        start, done = _aligning(attitude, state.reading, inputs, p, k)
+        gyro = state.gyro
+        nulled_parts = minimum(gyro[0].null.done, minimum(gyro[1].null.done, gyro[2].null.done))
+        start, done = _aligning(attitude, state.reading, nulled_parts, inputs, p, k)
         aligned = attitude.aligned > 0.5
         signal = _Read(state.signal.rate.estimate, state.signal.specific_force.estimate)
         now = choose(aligned, _Start(*running(attitude, signal, p), attitude.alignment), start)
@@ -1000,23 +999,31 @@ def _rules() -> tuple[Rule, ...]:
     )
 
 
-def _senses_per_register(_k: Coefficients) -> int:
-    return gyros.SENSES_PER_REGISTER
+_CIC, _DECIMATOR, _BARTLETT = 1, 1, 2
+"""How a part senses: as an ADXRS450, as an ADXL355, or as an ADIS16354, whatever its taps."""
 
 
 def _gyro_tasks(axis: int) -> tuple[Task, Task, Task]:
-    """A gyro with a CIC senses and updates its register; one with a Bartlett filter does all at every sample."""
+    """A gyro senses, and every few inputs updates its register: one task for a CIC, one for Bartlett filters."""
     name = f"gyro_{axis + 1}"
 
     def kind(p: Parameters) -> Scalar:
         return p.gyro.filter
 
+    def senses(k: Coefficients) -> Scalar:
+        return k.gyro.senses
+
     cic = GYRO_FILTER.value("cic")
     ways = {GYRO_FILTER.value(f"bartlett_{taps}"): _gyro_sample(axis, taps) for taps in TAPS}
     return (
-        Task(f"{name}_sense", name, {cic: _gyro_sense(axis)}, kind),
-        Task(f"{name}_register", name, {cic: _gyro_register(axis)}, kind, _senses_per_register, normals=4),
-        Task(f"{name}_sample", name, ways, kind, normals=4),
+        Task(
+            f"{name}_sense",
+            name,
+            {_CIC: _gyro_sense(axis, gyros.sense), _BARTLETT: _gyro_sense(axis, gyros.sense_bartlett)},
+            lambda p: where(p.gyro.filter == cic, _CIC, _BARTLETT),
+        ),
+        Task(f"{name}_register", name, {cic: _gyro_register(axis)}, kind, senses, normals=4),
+        Task(f"{name}_sample", name, ways, kind, senses, normals=4),
     )
 
 
@@ -1045,13 +1052,16 @@ MODEL = Model(
         Task(
             "accelerometer_sense",
             "accelerometer",
-            {ACCELEROMETER_FILTER.value("decimator"): accelerometer_sense},
-            choice=lambda p: p.accelerometer.filter,
+            {
+                _DECIMATOR: _accelerometer_sense(accelerometers.sense),
+                _BARTLETT: _accelerometer_sense(accelerometers.sense_bartlett),
+            },
+            lambda p: where(p.accelerometer.filter == _DECIMATOR, _DECIMATOR, _BARTLETT),
         ),
         Task(
             "accelerometer_register",
             "accelerometer",
-            {ACCELEROMETER_FILTER.value("decimator"): accelerometer_register},
+            {_DECIMATOR: accelerometer_register},
             choice=lambda p: p.accelerometer.filter,
             every=lambda k: k.accelerometer.decimation,
             normals=10,
@@ -1061,6 +1071,7 @@ MODEL = Model(
             "accelerometer",
             {ACCELEROMETER_FILTER.value(f"bartlett_{taps}"): _accelerometer_sample(taps) for taps in TAPS},
             choice=lambda p: p.accelerometer.filter,
+            every=lambda k: k.accelerometer.decimation,
             normals=10,
         ),
         Task("acquire", "processor", acquire),

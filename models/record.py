@@ -14,7 +14,7 @@ Everything else (FMI variables, XML, C tables, reference pages, value checks) is
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
@@ -173,6 +173,24 @@ def choose(condition: Scalar, a: Any, b: Any) -> Any:
 def defaults(record: type) -> Any:
     """The record with every field at its start value."""
     return unflatten(record, [leaf.start for leaf in leaves(record)])
+
+
+def with_defaults(record: type, values: Mapping[str, Any]) -> type:
+    """A record class with other start values, by structured name.
+
+    Raises `KeyError` for a name that is none of its scalars'.
+    """
+    unknown = set(values) - {leaf.name for leaf in leaves(record)}
+    if unknown:
+        raise KeyError(min(unknown))
+    whole = unflatten(record, [values.get(leaf.name, leaf.start) for leaf in leaves(record)])
+    own = {
+        "__module__": record.__module__,
+        "__doc__": record.__doc__,
+        "__slots__": (),
+        "_field_defaults": whole._asdict(),
+    }
+    return type(record.__name__, (record,), own)
 
 
 def allowed(fact: Fact) -> str:

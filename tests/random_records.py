@@ -16,8 +16,17 @@ COUNTERS = {
     "attitude.alignment.samples": (0, 10, 999, 1000, 1001),
     "attitude.fusion.rest.quiet": (0.0, 1.0, 1.6, 4.0),
     "accelerometer.samples": (0, 4, 5, 7),
+    "accelerometer.silent": (0, 0, 1, 2),
+    "accelerometer.words": (0, 1, 300),
+    **{f"accelerometer.condition[{axis}]": (0, 0, 1, 2) for axis in (1, 2, 3)},
+    **{f"gyro[{axis}].condition": (0, 0, 1, 2) for axis in (1, 2, 3)},
+    **{f"gyro[{axis}].words": (0, 1, 300, 15_000) for axis in (1, 2, 3)},
+    **{f"{part}.misalignment[{axis}]": (0.0, 0.0, 0.01) for part in ("gyro", "accelerometer") for axis in (1, 2, 3)},
+    **{f"fault[{i}].start": (0.0, 0.0, 0.3, 1e9) for i in (1, 2)},
+    **{f"fault[{i}].end": (0.0, 0.5, 1e9, 1e9) for i in (1, 2)},
+    **{f"fault[{i}].size": (-1.0, 0.1) for i in (1, 2)},
 }
-"""Values that reach every branch: start, shutter and knock, end of the alignment, rest, a due word."""
+"""Values that reach every branch: start, shutter and knock, end of the alignment, rest, a due word, silence, faults."""
 
 NEVER_WILD = ("attitude.q_nb", "attitude.fusion.covariance")
 """What no run can bring to zero or to a hundred times itself."""

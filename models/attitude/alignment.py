@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 
 from ..record import Boolean, Quaternion, Real, Vector3, choose
 from ..scalar import Scalar, absolute, atan2, both, cos, either, exp, floor, hypot, maximum, sin, sqrt, where
-from ..sensors.devices import ADXRS450
+from ..sensors.adxrs450_sheet import NULL_ACCURACY
 from ..vectors import ZERO3, add, dot, each_axis, multiply_transposed, scale, subtract
 from .rotations import (
     Euler,
@@ -28,7 +28,7 @@ class AlignmentParameters(NamedTuple):
     null_gyro: Annotated[bool, Boolean("take the mean rate at rest as gyro bias")] = True
     largest_null: Annotated[
         float, Real("rad/s", "mean rate that may still be bias; beyond it the body turns", min=0.0, display="deg/s")
-    ] = ADXRS450.null_accuracy.si
+    ] = NULL_ACCURACY.si
 
 
 class AlignmentState(NamedTuple):

@@ -5,7 +5,7 @@ filter; offset, fault, range, register word. Two digital filters are offered:
 
 * ``decimator``, the ADXL355's: first stage at 4 kHz, sinc^2 decimation to the output data rate, high-pass; the word
   appears after the filter's extra latency;
-* ``bartlett_1`` to ``bartlett_64``, the ADIS16354's at every sample.
+* ``bartlett_1`` to ``bartlett_64``, the ADIS16354's at every sample, four inputs a conversion.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 from ..record import Boolean, Enumeration, Integer, Item, Matrix3, Real, Vector3, choose
-from ..scalar import PI, Scalar, absolute, clip, exp, floor, maximum, minimum, where
+from ..scalar import Scalar, absolute, clip, floor, maximum, minimum, where
 from ..system import STOPPED
 from ..vectors import ZERO3, add, cross, dot, each_axis, multiply, scale
-from . import devices
+from .adxl355_sheet import ADXL355_2G, DELAYS, HIGH_PASS_CORNERS
 from .bandwidth import low_pass, low_pass_gain
 from .bias_instability import SIGMA_PER_INSTABILITY
+from .board import BOARD
 from .digital_filter import (
     BARTLETT_ITEMS,
     CONVERTER_STEPS,
@@ -40,19 +41,16 @@ from .sensitivity import bent, cubic_gains, sensitivity_matrix
 from .thermal import ThermalParameters, ThermometerParameters
 from .white_noise import block_sums, sample_deviation
 
-_SHEET = devices.ADXL355
-_BOARD = devices.BOARD
-_DELAYS = devices.ADXL355_DELAYS
-"""ms from an input to its word, by output data rate."""
+_FASTEST = ADXL355_2G.si("sampling_frequency")
 
 OUTPUT_DATA_RATE = Enumeration(
     "OutputDataRate",
     tuple(
         Item(
-            f"{_SHEET.sampling_frequency.value / 2**i:.4g}_Hz".replace(".", "_"),
-            f"{_SHEET.sampling_frequency.value / 2**i:.4g} samples a second",
+            f"{_FASTEST / 2**i:.4g}_Hz".replace(".", "_"),
+            f"{_FASTEST / 2**i:.4g} samples a second",
         )
-        for i in range(len(_DELAYS))
+        for i in range(len(DELAYS))
     ),
     "output data rate of the decimator, FILTER register [3:0]",
 )
@@ -62,7 +60,7 @@ HIGH_PASS = Enumeration(
         Item("none", "no high-pass"),
         *(
             Item(f"corner_{code}", f"corner at {corner.value:.4g} of the output data rate, code {code}")
-            for code, corner in enumerate(devices.ADXL355_HIGH_PASS, 1)
+            for code, corner in enumerate(HIGH_PASS_CORNERS, 1)
         ),
     ),
     "high-pass, FILTER register [6:4]",
@@ -72,6 +70,8 @@ ACCELEROMETER_FILTER = Enumeration(
     (Item("decimator", "ADXL355: decimation to the output data rate"), *BARTLETT_ITEMS),
     "digital filter of the accelerometer",
 )
+SENSES_PER_CONVERSION = 4.0
+"""Inputs taken per conversion of the part with Bartlett filters, for the sake of its bandwidth."""
 FIRST_STAGE_CURVATURE = 0.32
 """1 - |H| of the first stage at a quarter of its rate: -3.6 dB at 1 kHz (Rev. D p. 26), full path."""
 
@@ -80,33 +80,35 @@ class AccelerometerParameters(NamedTuple):
     """An accelerometer and what is peculiar to this board's."""
 
     filter: Annotated[int, ACCELEROMETER_FILTER] = ACCELEROMETER_FILTER.value("decimator")
-    range: Annotated[float, Real("m/s2", "full scale", min=1e-3)] = _SHEET.range.si
-    resolution: Annotated[float, Real("m/s2", "one LSB of the data registers", min=1e-12)] = 1.0 / _SHEET.sensitivity.si
-    code_limit: Annotated[float, Integer("codes run from minus this to one less", min=2, max=2**31 - 1)] = 2 ** (
-        int(_SHEET.word_length.value) - 1
+    range: Annotated[float, Real("m/s2", "full scale", min=1e-3)] = ADXL355_2G.si("range")
+    resolution: Annotated[float, Real("m/s2", "one LSB of the data registers", min=1e-12)] = ADXL355_2G.si("resolution")
+    code_limit: Annotated[float, Integer("codes run from minus this to one less", min=2, max=2**31 - 1)] = int(
+        ADXL355_2G.si("code_limit")
     )
-    noise_density: Annotated[float, Real("m/(s2.Hz^0.5)", "white noise, one-sided", min=0.0)] = _SHEET.noise_density.si
-    bias_instability: Annotated[float, Real("m/s2", "flicker of the bias, IEEE 952 B", min=0.0)] = (
-        _SHEET.bias_stability.si * devices.ALLAN_MINIMUM_TO_BIAS_INSTABILITY
+    noise_density: Annotated[float, Real("m/(s2.Hz^0.5)", "white noise, one-sided", min=0.0)] = ADXL355_2G.si(
+        "noise_density"
+    )
+    bias_instability: Annotated[float, Real("m/s2", "flicker of the bias, IEEE 952 B", min=0.0)] = ADXL355_2G.si(
+        "bias_instability"
     )
     rate_random_walk: Annotated[float, Real("m/(s2.s^0.5)", "random walk of the bias, IEEE 952 K", min=0.0)] = 0.0
     turn_on_bias: Annotated[float, Real("m/s2", "standard deviation of the bias from run to run", min=0.0)] = 0.0
-    bandwidth: Annotated[float, Real("Hz", "analogue bandwidth before the Bartlett filter", min=1.0)] = (
-        devices.ADIS16354_BANDWIDTH.si
+    bandwidth: Annotated[float, Real("Hz", "analogue bandwidth before the Bartlett filter", min=1.0)] = ADXL355_2G.si(
+        "bandwidth"
     )
     sampling_frequency: Annotated[
         float, Real("Hz", "nominal rate of the first decimation, or of conversions", min=1.0, max=1e5)
-    ] = _SHEET.sampling_frequency.si
+    ] = _FASTEST
     divider: Annotated[int, Integer("conversions per sample of the Bartlett filter", min=1, max=4096)] = 1
     output_data_rate: Annotated[int, OUTPUT_DATA_RATE] = OUTPUT_DATA_RATE.value("500_Hz")
     high_pass: Annotated[int, HIGH_PASS] = HIGH_PASS.value("none")
     clock_error: Annotated[float, Real("1", "relative error of the part's clock", min=-0.1, max=0.1)] = (
-        _BOARD.accelerometer_clock_error
+        BOARD.accelerometer_clock_error
     )
     clock_jitter: Annotated[float, Real("s", "standard deviation of the moment of a sample", min=0.0, max=1e-2)] = 0.0
-    bias: Annotated[Vector3, Real("m/s2", "0 g offset at 25 degC")] = _BOARD.accelerometer_bias
+    bias: Annotated[Vector3, Real("m/s2", "0 g offset at 25 degC")] = BOARD.accelerometer_bias
     bias_temperature_slope: Annotated[Vector3, Real("m/(s2.K)", "change of the offset with temperature")] = (
-        _BOARD.accelerometer_bias_temperature_slope
+        BOARD.accelerometer_bias_temperature_slope
     )
     bias_temperature_curve: Annotated[Vector3, Real("m/(s2.K2)", "change of the offset with temperature squared")] = (
         ZERO3
@@ -117,7 +119,7 @@ class AccelerometerParameters(NamedTuple):
     )
     supply_sensitivity: Annotated[float, Real("m/(s2.V)", "change of the offset with the supply voltage")] = 0.0
     scale_error: Annotated[Vector3, Real("1", "relative error of the sensitivity at 25 degC", min=-0.5, max=0.5)] = (
-        _BOARD.accelerometer_scale_error
+        BOARD.accelerometer_scale_error
     )
     scale_temperature_slope: Annotated[Vector3, Real("1/K", "relative change of the sensitivity with temperature")] = (
         ZERO3
@@ -127,9 +129,9 @@ class AccelerometerParameters(NamedTuple):
     ] = ZERO3
     nonlinearity: Annotated[
         float, Real("1", "rms deviation from the best straight line, of the full scale", min=0.0, max=0.1)
-    ] = 0.0
+    ] = ADXL355_2G.si("nonlinearity")
     cross_axis: Annotated[Matrix3, Real("1", "share of the column's axis in the row's reading", min=-0.5, max=0.5)] = (
-        _BOARD.accelerometer_cross_axis
+        BOARD.accelerometer_cross_axis
     )
     nonorthogonality: Annotated[
         Vector3,
@@ -146,17 +148,17 @@ class AccelerometerParameters(NamedTuple):
     rectification: Annotated[Vector3, Real("s2/m", "offset by the square of the specific force")] = ZERO3
     overload: Annotated[
         float, Real("m/s2", "true specific force beyond which the part falls silent for half a millisecond", min=1e-3)
-    ] = _SHEET.overload.si
-    self_test_response: Annotated[Vector3, Real("m/s2", "reading that the self-test adds")] = (
-        devices.ADXL355_SELF_TEST[0].si,
-        devices.ADXL355_SELF_TEST[0].si,
-        devices.ADXL355_SELF_TEST[1].si,
+    ] = ADXL355_2G.si("overload")
+    self_test_response: Annotated[Vector3, Real("m/s2", "reading that the self-test adds")] = ADXL355_2G.of_each_axis(
+        "self_test_response"
     )
     self_test: Annotated[bool, Boolean("the self-test is on", tunable=True)] = False
     thermometer: ThermometerParameters = ThermometerParameters(
-        _SHEET.thermometer_sensitivity.si, _SHEET.thermometer_code.si
+        ADXL355_2G.si("thermometer.sensitivity"), ADXL355_2G.si("thermometer.code_at_25")
     )
-    thermal: ThermalParameters = ThermalParameters(_SHEET.self_heating.si, _SHEET.warm_up.si)
+    thermal: ThermalParameters = ThermalParameters(
+        ADXL355_2G.si("thermal.self_heating"), ADXL355_2G.si("thermal.warm_up")
+    )
 
 
 class AccelerometerCoefficients(NamedTuple):
@@ -168,7 +170,7 @@ class AccelerometerCoefficients(NamedTuple):
     word_period: Annotated[float, Real("s", "time between register words")]
     low_pass_gain: Annotated[float, Real("1", "share of a step taken over in a sense period")]
     taps: Annotated[FourTaps, Real("1", "weights of the first stage")]
-    decimation: Annotated[float, Integer("sense periods per output word")]
+    decimation: Annotated[float, Integer("inputs taken per register word")]
     latency: Annotated[float, Integer("sense periods from the end of a window to its word")]
     high_pass_gain: Annotated[float, Real("1", "share of a step that the high-pass forgets in a word")]
     sample_deviation: Annotated[float, Real("m/s2", "white noise of a sample at the sampling frequency")]
@@ -178,14 +180,14 @@ class AccelerometerCoefficients(NamedTuple):
 class AccelerometerState(NamedTuple):
     """The three axes."""
 
-    specific_force: Annotated[Vector3, Real("m/s2", "specific force as last sensed")]
+    specific_force: Annotated[Vector3, Real("m/s2", "specific force as last sensed, behind the bandwidth")]
     before: Annotated[tuple[Vector3, Vector3, Vector3], Real("m/s2", "the three samples before, for the first stage")]
     silent: Annotated[float, Integer("sense periods that an overload still silences the part")]
     block: Annotated[Vector3, Real("m/s2", "sum of the block's samples")]
     weighted_block: Annotated[Vector3, Real("m/s2", "sum of the block's samples by their number")]
     samples: Annotated[float, Real("1", "samples in the block so far")]
     rising: Annotated[Vector3, Real("m/s2", "rising half of the window under way")]
-    mean: Annotated[Vector3, Real("m/s2", "mean of the last block")]
+    mean: Annotated[Vector3, Real("m/s2", "mean over the last block, or since the input before")]
     steady: Annotated[Vector3, Real("m/s2", "what the high-pass takes away")]
     sums: tuple[BartlettSums, BartlettSums, BartlettSums]
     words: Annotated[float, Real("1", "register words so far")]
@@ -209,13 +211,15 @@ def accelerometer_coefficients(
     """Coefficients of the part; an ideal one is read directly, its clock stands still."""
     decimates = part.filter == ACCELEROMETER_FILTER.value("decimator")
     full = part.sampling_frequency * (1.0 + part.clock_error)
-    frequency = full / where(decimates, 1.0, 1.0 * part.divider)
+    frequency = full * where(decimates, 1.0, SENSES_PER_CONVERSION)
     choice = part.output_data_rate
-    decimation = where(decimates, _chosen(choice, tuple(2.0**i for i in range(len(_DELAYS)))), 1.0)
+    decimation = where(
+        decimates, _chosen(choice, tuple(2.0**i for i in range(len(DELAYS)))), SENSES_PER_CONVERSION * part.divider
+    )
     # the sinc^2 itself delays by R - 1 samples; of the rest whole ones are latency, the first stage does what is left
-    rest = _chosen(choice, tuple(delay.si * _SHEET.sampling_frequency.si for delay in _DELAYS)) - (decimation - 1.0)
+    rest = _chosen(choice, tuple(delay.si * _FASTEST for delay in DELAYS)) - (decimation - 1.0)
     latency = minimum(maximum(floor(rest - 1.0 + 1e-9), 1.0), decimation)
-    corner = _chosen(part.high_pass, (0.0, *[corner.value for corner in devices.ADXL355_HIGH_PASS]))
+    corner = _chosen(part.high_pass, (0.0, *[corner.value for corner in HIGH_PASS_CORNERS]))
     return AccelerometerCoefficients(
         sensitivity=sensitivity_matrix(
             part.scale_error, part.cross_axis, part.nonorthogonality, part.misalignment, mounting
@@ -227,7 +231,7 @@ def accelerometer_coefficients(
         taps=delaying_taps(clip(rest - latency, 1.0, 2.0), FIRST_STAGE_CURVATURE),
         decimation=decimation,
         latency=latency,
-        high_pass_gain=1.0 - exp(-2.0 * PI * corner),
+        high_pass_gain=low_pass_gain(corner, 1.0),
         sample_deviation=sample_deviation(part.noise_density, full),
         instability_sigma=part.bias_instability * SIGMA_PER_INSTABILITY,
     )
@@ -247,6 +251,11 @@ def _sensed(force: Vector3, factor: Vector3, p: AccelerometerParameters, k: Acce
         bent(y * factor[1], k.cubic) + p.rectification[1] * square,
         bent(z * factor[2], k.cubic) + p.rectification[2] * square,
     )
+
+
+def _converted(value: Scalar, p: AccelerometerParameters) -> Scalar:
+    """What the ADIS16354's converter makes of a specific force; it goes on to twice the range."""
+    return converted(clip(value, -2.0 * p.range, 2.0 * p.range), p.resolution)
 
 
 class _Words(NamedTuple):
@@ -289,7 +298,7 @@ def initial_accelerometer(
     """The part after a long time at this specific force, without noise."""
     sensed = _sensed(force, factor, p, k)
     n = k.decimation
-    rising = scale(0.5 * n * (n + 1.0), sensed)
+    rising = scale(0.5 * n * (n - 1.0), sensed)
     read = add(sensed, offset)
     passes = p.high_pass == HIGH_PASS.value("none")
     steady = choose(passes, ZERO3, read)
@@ -297,7 +306,7 @@ def initial_accelerometer(
     code = each_axis(lambda i: register_code(values[i], p.range, p.resolution, p.code_limit))
     beyond = each_axis(lambda i: over_range(values[i], p.range))
     taps = taps_of(p.filter, ACCELEROMETER_FILTER.value("bartlett_1"))
-    filters = each_axis(lambda i: settled_bartlett(converted(read[i], p.resolution), taps))
+    filters = each_axis(lambda i: settled_bartlett(_converted(read[i], p), taps))
     state = AccelerometerState(
         sensed,
         (sensed, sensed, sensed),
@@ -322,24 +331,29 @@ _SILENCE = 5e-4
 """s for which the part falls silent after an overload (Rev. D p. 24)."""
 
 
-def _silenced(state: AccelerometerState, force: Vector3, p: AccelerometerParameters, period: Scalar) -> Scalar:
-    """Sense periods of silence left: an overload starts them anew."""
-    x, y, z = force
+def _silenced(state: AccelerometerState, sensed: Vector3, p: AccelerometerParameters, period: Scalar) -> Scalar:
+    """Sense periods of silence left: an overload of any axis starts them anew."""
+    x, y, z = sensed
     most = maximum(maximum(absolute(x), absolute(y)), absolute(z))
     return where(most > p.overload, floor(_SILENCE / period + 0.5), maximum(state.silent - 1.0, 0.0))
+
+
+Sense = Callable[
+    [AccelerometerState, Vector3, Vector3, AccelerometerParameters, AccelerometerCoefficients], AccelerometerState
+]
 
 
 def sense(
     state: AccelerometerState, force: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients
 ) -> AccelerometerState:
     """Step of the decimating part at the sampling frequency: an input enters the block, a due word the registers."""
-    silent = _silenced(state, force, p, k.sense_period)
+    x, y, z = felt = _sensed(force, factor, p, k)
+    silent = _silenced(state, felt, p, k.sense_period)
     heard = where(silent > 0.5, 0.0, 1.0)
-    x, y, z = _sensed(force, factor, p, k)
     sensed = (heard * x, heard * y, heard * z)
     f = four_tapped(k.taps, sensed, state.before)
-    a, b, n = state.block, state.weighted_block, state.samples + 1.0
-    due = n == k.latency
+    a, b, n = state.block, state.weighted_block, state.samples
+    due = n + 1.0 == k.latency
     pending, code = state.pending, state.code
     return AccelerometerState(
         sensed,
@@ -347,7 +361,7 @@ def sense(
         silent,
         (a[0] + f[0], a[1] + f[1], a[2] + f[2]),
         (b[0] + n * f[0], b[1] + n * f[1], b[2] + n * f[2]),
-        n,
+        n + 1.0,
         state.rising,
         state.mean,
         state.steady,
@@ -358,6 +372,15 @@ def sense(
         state.over_range,
         state.condition,
     )
+
+
+def sense_bartlett(
+    state: AccelerometerState, force: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients
+) -> AccelerometerState:
+    """Step of the part with Bartlett filters at four times its conversions: an input passes the bandwidth."""
+    before, true = state.specific_force, _sensed(force, factor, p, k)
+    passed = each_axis(lambda i: low_pass(before[i], true[i], k.low_pass_gain))
+    return AccelerometerState(passed, *state[1:7], each_axis(lambda i: 0.5 * (before[i] + passed[i])), *state[8:])
 
 
 def register(
@@ -379,10 +402,10 @@ def register(
         )
         read = y + (mean[axis] - state.mean[axis]) * late + offset[axis]
         slow = low_pass(state.steady[axis], read, k.high_pass_gain)
-        values.append(read - slow)
+        values.append(read - 0.5 * (state.steady[axis] + slow))
         rising.append(kept)
         steady.append(slow)
-    time = (state.words + 1.0) * k.word_period
+    time = state.words * k.word_period
     words = _words((values[0], values[1], values[2]), state.pending, p, time, faults, draws[7:10])
     return AccelerometerState(
         state.specific_force,
@@ -404,43 +427,30 @@ def register(
 
 
 def sample(taps: int) -> Callable[..., tuple[AccelerometerState, tuple[DelayLines, DelayLines, DelayLines]]]:
-    """Step of the part with Bartlett filters: bandwidth, noise, offset, converter, filter, fault, range and word."""
+    """Step of the part with Bartlett filters at its sampling rate: noise, offset, filter, fault, range and word."""
 
     def step(
         state: AccelerometerState,
         lines: tuple[DelayLines, DelayLines, DelayLines],
-        force: Vector3,
-        factor: Vector3,
         offset: Vector3,
         p: AccelerometerParameters,
         k: AccelerometerCoefficients,
         faults: tuple[FaultParameters, ...],
         draws: tuple[Scalar, ...],
     ) -> tuple[AccelerometerState, tuple[DelayLines, DelayLines, DelayLines]]:
-        true = _sensed(force, factor, p, k)
-        sensed = each_axis(lambda i: low_pass(state.specific_force[i], true[i], k.low_pass_gain))
-        late = p.clock_jitter * draws[6] / k.sense_period
+        late = p.clock_jitter * draws[6] * (2.0 / k.sense_period)
         values, sums, after = [], [], []
         for axis in range(3):
-            jitter = (sensed[axis] - state.specific_force[axis]) * late
-            noisy = sensed[axis] + jitter + k.sample_deviation * draws[2 * axis] + offset[axis]
-            limited = clip(noisy, -2.0 * p.range, 2.0 * p.range)
-            y, one_sums, one_lines = bartlett(state.sums[axis], lines[axis], converted(limited, p.resolution), taps)
+            jitter = (state.specific_force[axis] - state.mean[axis]) * late
+            noisy = state.mean[axis] + jitter + k.sample_deviation * draws[2 * axis] + offset[axis]
+            y, one_sums, one_lines = bartlett(state.sums[axis], lines[axis], _converted(noisy, p), taps)
             values.append(y * (p.resolution / CONVERTER_STEPS))
             sums.append(one_sums)
             after.append(one_lines)
         counted = state.words + 1.0
         words = _words((values[0], values[1], values[2]), state.code, p, counted * k.word_period, faults, draws[7:10])
         part = AccelerometerState(
-            sensed,
-            state.before,
-            state.silent,
-            state.block,
-            state.weighted_block,
-            state.samples,
-            state.rising,
-            state.mean,
-            state.steady,
+            *state[:9],
             (sums[0], sums[1], sums[2]),
             counted,
             words.code,

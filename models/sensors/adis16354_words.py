@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from ..attitude.rotations import STANDARD_GRAVITY
 from ..record import Boolean
-from ..scalar import PI, Scalar, where
-from .devices import REFERENCE_TEMPERATURE
+from ..scalar import Scalar, where
+from .adis16354_sheet import ACCELEROMETERS, AUXILIARY_WEIGHT, GYROS_300, SUPPLY_WEIGHT
+from .datasheet import REFERENCE_TEMPERATURE
 from .words import field, flags, nearest_signed, nearest_unsigned, pattern, signed
 
 RANGE_75, RANGE_150, RANGE_300 = 1.0, 2.0, 4.0
@@ -21,16 +21,13 @@ RANGE_75, RANGE_150, RANGE_300 = 1.0, 2.0, 4.0
 DATA_BITS, SHORT_BITS = 14, 12
 """Width of gyro and accelerometer data, and of temperature, supply and auxiliary data."""
 
-TEMPERATURE_WEIGHT = 0.1453
+TEMPERATURE_WEIGHT: float = 1.0 / GYROS_300.si("thermometer.sensitivity")
 """K/LSB, 0 at 25 degC (ADIS16354A.h; sister Rev. B Table 1)."""
 
-SUPPLY_WEIGHT, AUXILIARY_WEIGHT = 1.8315e-3, 0.6105e-3
-"""V/LSB of SUPPLY_OUT and AUX_ADC (ADIS16354A.h; sister Rev. B)."""
-
-GYRO_OFFSET_WEIGHT = 0.018315 * PI / 180.0
+GYRO_OFFSET_WEIGHT: float = GYROS_300.si("null_resolution")
 """rad/s per LSB of X/Y/ZGYRO_OFF (sister Rev. B): a quarter of the data's 0.07326 deg/s at +-300 deg/s."""
 
-ACCELERATION_WEIGHT = 0.4672e-3 * STANDARD_GRAVITY
+ACCELERATION_WEIGHT: float = ACCELEROMETERS.si("resolution")
 """m/s^2 per LSB of X/Y/ZACCL_OUT and X/Y/ZACCL_OFF (ADIS16354A.h; 0.467 mg in PX4)."""
 
 FAST_TIME_BASE, SLOW_TIME_BASE = 0.61035e-3, 18.921e-3
@@ -87,12 +84,12 @@ def temperature_of_code(code: Scalar) -> Scalar:
 
 def supply_code(voltage: Scalar) -> Scalar:
     """Unsigned 12-bit code of SUPPLY_OUT for a supply in V, 1.8315 mV/LSB."""
-    return nearest_unsigned(voltage / SUPPLY_WEIGHT, SHORT_BITS)
+    return nearest_unsigned(voltage / SUPPLY_WEIGHT.si, SHORT_BITS)
 
 
 def auxiliary_code(voltage: Scalar) -> Scalar:
     """Unsigned 12-bit code of AUX_ADC for an input in V, 0.6105 mV/LSB, 2.5 V at full scale."""
-    return nearest_unsigned(voltage / AUXILIARY_WEIGHT, SHORT_BITS)
+    return nearest_unsigned(voltage / AUXILIARY_WEIGHT.si, SHORT_BITS)
 
 
 def status_word(status: Status) -> Scalar:

@@ -10,7 +10,9 @@ from typing import Annotated, NamedTuple
 
 from ..record import Boolean
 from ..scalar import Scalar, clip, floor
-from .devices import REFERENCE_TEMPERATURE
+from .adxl355_sheet import ADXL355_2G, ADXL355_4G, ADXL355_8G, DELAYS
+from .adxl355_sheet import HIGH_PASS_CORNERS as _CORNERS
+from .datasheet import REFERENCE_TEMPERATURE
 from .words import field, flags, nearest_signed, nearest_unsigned, pattern, signed
 
 CODE_BITS = 20
@@ -18,23 +20,23 @@ CODE_BITS = 20
 RANGE_2G, RANGE_4G, RANGE_8G = 1, 2, 3
 """Codes of the Range register's bits 1..0."""
 
-TEMPERATURE_AT_25_DEGC = 1885.0
+TEMPERATURE_AT_25_DEGC: float = ADXL355_2G.si("thermometer.code_at_25")
 """Temperature code at 25 degC, Rev. D Table 2; Rev. 0 has 1852. The sensor is not calibrated."""
 
-TEMPERATURE_SLOPE = -9.05
+TEMPERATURE_SLOPE: float = ADXL355_2G.si("thermometer.sensitivity")
 """LSB/K, Rev. D Table 2."""
 
 OFFSET_WEIGHT = 16.0
 """One LSB of an OFFSET register in 20-bit codes: it has the weight of DATA[19:4]."""
 
-HIGH_PASS_CORNERS = (0.0, 24.7e-4, 6.2084e-4, 1.5545e-4, 0.3862e-4, 0.0954e-4, 0.0238e-4)
+HIGH_PASS_CORNERS = (0.0, *[corner.value for corner in _CORNERS])
 """Corner over output data rate for each HPF_CORNER code; code 0 is off (Rev. D; Linux adxl355_core.c agrees)."""
 
-OUTPUT_RATE_CODES = 11
+OUTPUT_RATE_CODES = len(DELAYS)
 """ODR_LPF codes 0 to 10: 4000 Hz, each half the one before (Rev. D p. 27)."""
 
-_SENSITIVITY_2G = 256_000.0  # LSB/g, Rev. D Table 2; half of it for each wider range
-_FASTEST = 4000.0  # Hz
+_PARTS = {RANGE_2G: ADXL355_2G, RANGE_4G: ADXL355_4G, RANGE_8G: ADXL355_8G}
+_FASTEST: float = ADXL355_2G.si("sampling_frequency")  # Hz
 
 
 class Status(NamedTuple):
@@ -120,9 +122,9 @@ def range_register(code: Scalar, fast_i2c: Scalar = 1.0, interrupt_polarity: Sca
 
 def sensitivity(range_code: int) -> float:
     """Nominal sensitivity in LSB/g of the 20-bit code for a range code 1 to 3 (Rev. D Table 2)."""
-    if range_code not in (RANGE_2G, RANGE_4G, RANGE_8G):
+    if range_code not in _PARTS:
         raise ValueError(f"range code {range_code} is not one of 1 (+-2 g), 2 (+-4 g), 3 (+-8 g)")
-    return _SENSITIVITY_2G / 2.0 ** (range_code - RANGE_2G)
+    return _PARTS[range_code].datum("resolution").value
 
 
 def offset_word(offset: Scalar) -> Scalar:

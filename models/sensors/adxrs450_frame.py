@@ -12,7 +12,8 @@ from typing import Annotated, NamedTuple
 
 from ..record import Boolean
 from ..scalar import Scalar, absolute, floor, where
-from .devices import CELSIUS_ZERO
+from .adxrs450_sheet import ADXRS450, CONTINUOUS_SELF_TEST, THERMOMETER_ZERO
+from .datasheet import CELSIUS_ZERO
 from .words import field, flags, nearest_signed, odd, ones, parity, pattern, signed
 
 INVALID, VALID, SELF_TEST, REGISTER = 0.0, 1.0, 2.0, 3.0
@@ -25,7 +26,7 @@ RATE, TEMPERATURE, LOW_SELF_TEST, HIGH_SELF_TEST, QUADRATURE = 0x00, 0x02, 0x04,
 FAULT, PART_IDENTITY, SERIAL_NUMBER_HIGH, SERIAL_NUMBER_LOW, NULL_CORRECTION = 0x0A, 0x0C, 0x0E, 0x10, 0x12
 """Addresses of the 16-bit registers (Rev. 0 memory map); only the null correction can be written."""
 
-SELF_TEST_NOMINAL = 2559.0
+SELF_TEST_NOMINAL = CONTINUOUS_SELF_TEST.value
 """Continuous self-test (LOCST register) of a sound part, LSB of 1/80 deg/s (Rev. 0 Table 1)."""
 
 SELF_TEST_FLAG_TOLERANCE, SELF_TEST_VALID_TOLERANCE = 320.0, 1280.0
@@ -34,8 +35,8 @@ SELF_TEST_FLAG_TOLERANCE, SELF_TEST_VALID_TOLERANCE = 320.0, 1280.0
 SELF_TEST_FLAG_TOLERANCE_OF_TEXT, SELF_TEST_VALID_TOLERANCE_OF_TEXT = 512.0, 1856.0
 """The same limits as the text of the same Rev. 0 has them, in contradiction to its Table 1."""
 
-_TEMPERATURE_ZERO = 45.0  # degC at 0 LSB, Rev. 0 Table 1
-_TEMPERATURE_SENSITIVITY = 5.0  # LSB/degC, Rev. 0 Table 1
+_TEMPERATURE_ZERO = THERMOMETER_ZERO.value
+_TEMPERATURE_SENSITIVITY = ADXRS450.si("thermometer.sensitivity")
 
 
 class FaultBits(NamedTuple):

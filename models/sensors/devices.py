@@ -1,208 +1,155 @@
-"""The parts as data: every number of a datasheet once, in the datasheet's unit, with its source and how sure it is.
+"""Whole sensors by name: which parts they are made of, their parameters in SI with their sources, and single pieces.
 
-Confidence of a number: ``datasheet`` (read in its text), ``figure`` (read by eye off a figure, +-20 % or worse),
-``driver`` (read in driver source), ``sister`` (datasheet of a sister part), ``recalled`` (from memory, not seen),
-``calculated`` (from such numbers), ``assumption`` (engineering judgement).
-The sheets: ADXRS450 Rev. 0 (1/2011), ADXL354/ADXL355 Rev. D (6/2025) and Rev. 0 (9/2016).
+``parameters("ADIS16354_150")`` is a nominal piece, all that differs from piece to piece being zero;
+``parameters("ADIS16354_150", 3)`` is piece number 3 of all that the tolerances allow, the same on every machine.
+Every number is a parameter of the attitude sensor and can be overridden. What belongs to the processor (its period,
+the solver and its tuning, the ADIS16354's null on command) is not the sensor's and stays as it is.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from itertools import count
+from typing import Any, NamedTuple
 
-from ..attitude.rotations import STANDARD_GRAVITY
-from ..record import Matrix3, Vector3
-from ..scalar import PI
-from ..vectors import scale
+from ..errors import AttitudeFmuError
+from ..noise import normals, philox4x64, stream_of
+from ..record import Boolean, Enumeration, Fact, Integer, leaves
+from .accelerometer import AccelerometerParameters
+from .adis16354_sheet import ACCELEROMETERS, ACCELEROMETERS_75, GYROS_75, GYROS_150, GYROS_300
+from .adxl355_sheet import ADXL355_2G, ADXL355_4G, ADXL355_8G
+from .adxrs450_sheet import ADXRS450, ADXRS453
+from .datasheet import Choice, Datum, Origin, Part, Tolerance, in_si
+from .gyro import GyroParameters
 
-_DEGREE = PI / 180.0
-_SI_FACTOR = {
-    "1": 1.0,
-    "%": 1e-2,
-    "Hz": 1.0,
-    "s": 1.0,
-    "ms": 1e-3,
-    "K": 1.0,
-    "deg/s": _DEGREE,
-    "deg/h": _DEGREE / 3600.0,
-    "deg/s/rtHz": _DEGREE,
-    "deg/s/degC": _DEGREE,
-    "deg/s/g": _DEGREE / STANDARD_GRAVITY,
-    "LSB/(deg/s)": 1.0 / _DEGREE,
-    "g": STANDARD_GRAVITY,
-    "mg": 1e-3 * STANDARD_GRAVITY,
-    "ug": 1e-6 * STANDARD_GRAVITY,
-    "ug/rtHz": 1e-6 * STANDARD_GRAVITY,
-    "mg/degC": 1e-3 * STANDARD_GRAVITY,
-    "LSB/g": 1.0 / STANDARD_GRAVITY,
-    "LSB": 1.0,
-    "LSB/degC": 1.0,
-    "cycles": 1.0,
+BOARD_AROUND = Part(
+    "board around the parts",
+    {"supply.nominal": Datum(5.0, "V", "ADXRS450 Rev. 0 Table 1; ADIS16350/55 Rev. B Table 1, conditions")},
+    {"processor.clock_error": Tolerance(50.0, "ppm", "limits", "crystals, 20 to 50 ppm", "recalled")},
+)
+"""What the parts need of their board."""
+
+_OF_THE_RUN = {"self_test", "thermal.warmed_up"}
+"""What no part has, but the experiment chooses."""
+
+
+class UnknownDeviceError(AttitudeFmuError, KeyError):
+    """No device is called so, or it has no such piece."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class Device(NamedTuple):
+    """A whole sensor."""
+
+    name: str
+    description: str
+    gyro: Part
+    accelerometer: Part
+
+
+DEVICES = {
+    device.name: device
+    for device in (
+        Device("ADXRS450_ADXL355", "three ADXRS450, one ADXL355 at +-2 g", ADXRS450, ADXL355_2G),
+        Device("ADXRS450_ADXL355_4g", "three ADXRS450, one ADXL355 at +-4 g", ADXRS450, ADXL355_4G),
+        Device("ADXRS450_ADXL355_8g", "three ADXRS450, one ADXL355 at +-8 g", ADXRS450, ADXL355_8G),
+        Device("ADXRS453_ADXL355", "three ADXRS453, one ADXL355 at +-2 g", ADXRS453, ADXL355_2G),
+        Device("ADIS16354_300", "one ADIS16354 at +-300 deg/s, 4 taps", GYROS_300, ACCELEROMETERS),
+        Device("ADIS16354_150", "one ADIS16354 at +-150 deg/s, 4 taps", GYROS_150, ACCELEROMETERS),
+        Device("ADIS16354_75", "one ADIS16354 at +-75 deg/s, 16 taps", GYROS_75, ACCELEROMETERS_75),
+    )
 }
-CELSIUS_ZERO = 273.15
-REFERENCE_TEMPERATURE = 25.0 + CELSIUS_ZERO
-"""Temperature of the datasheets' typical numbers, K."""
-
-ALLAN_MINIMUM_TO_BIAS_INSTABILITY = 1.0 / 0.664
-"""B = (minimum of the Allan deviation) / sqrt(2 ln 2 / pi), IEEE Std 952 Annex C."""
+DEFAULT = "ADXRS450_ADXL355"
+"""The parts whose numbers the model has by default, there with the errors of one board (`board`)."""
 
 
-class Datum(NamedTuple):
-    """A number of a datasheet."""
+def device_called(name: str) -> Device:
+    """The device of this name.
 
-    value: float
-    unit: str
-    source: str
-    confidence: str = "datasheet"
-
-    @property
-    def si(self) -> float:
-        """The number in SI units (rad, m, s, K)."""
-        return self.value * _SI_FACTOR[self.unit]
+    Raises `UnknownDeviceError` with the known ones.
+    """
+    if name not in DEVICES:
+        raise UnknownDeviceError(f"there is no device called {name}; there are {', '.join(DEVICES)}")
+    return DEVICES[name]
 
 
-class GyroSheet(NamedTuple):
-    """Datasheet of a single-axis digital rate gyro."""
+class _Field(NamedTuple):
+    """A parameter: its name, its place in its part (from 1, the row for a matrix; none for a scalar), its part."""
 
-    range: Datum
-    sensitivity: Datum
-    noise_density: Datum
-    null_accuracy: Datum
-    bias_stability: Datum
-    bias_temperature_slope: Datum
-    g_sensitivity: Datum
-    word_length: Datum
-    resonator_frequency: Datum
-    demodulator_bandwidth: Datum
-    thermometer_sensitivity: Datum
-    thermometer_code: Datum
-    self_heating: Datum
-    warm_up: Datum
+    name: str
+    key: str
+    place: tuple[int, ...]
+    fact: Fact | None
+    part: Part
 
 
-class AccelerometerSheet(NamedTuple):
-    """Datasheet of a three-axis digital accelerometer."""
-
-    range: Datum
-    sensitivity: Datum
-    noise_density: Datum
-    bias_stability: Datum
-    offset_temperature_slope: Datum
-    word_length: Datum
-    sampling_frequency: Datum
-    overload: Datum
-    thermometer_sensitivity: Datum
-    thermometer_code: Datum
-    self_heating: Datum
-    warm_up: Datum
+def _fields(device: Device) -> Iterator[_Field]:
+    for prefix, part, record in (
+        ("gyro", device.gyro, GyroParameters),
+        ("accelerometer", device.accelerometer, AccelerometerParameters),
+    ):
+        for leaf in leaves(record):
+            key, _, place = leaf.name.removesuffix("]").partition("[")
+            if key not in _OF_THE_RUN:
+                places = tuple(map(int, place.split(","))) if place else ()
+                yield _Field(f"{prefix}.{leaf.name}", key, places, leaf.fact, part)
+    for key in (*BOARD_AROUND.numbers, *BOARD_AROUND.tolerances):
+        yield _Field(key, key, (), None, BOARD_AROUND)
 
 
-ADXRS450 = GyroSheet(
-    range=Datum(300.0, "deg/s", "Rev. 0 Table 1, guaranteed full scale"),
-    sensitivity=Datum(80.0, "LSB/(deg/s)", "Rev. 0 Table 1"),
-    noise_density=Datum(0.015, "deg/s/rtHz", "Rev. 0 Table 1, one-sided"),
-    null_accuracy=Datum(3.0, "deg/s", "Rev. 0 Table 1, typical column, over temperature"),
-    bias_stability=Datum(25.0, "deg/h", "Rev. 0 p. 1, minimum of the root Allan variance"),
-    bias_temperature_slope=Datum(0.003, "deg/s/degC", "Rev. 0 Figure 14, 16 parts over 150 degC", "figure"),
-    g_sensitivity=Datum(0.03, "deg/s/g", "Rev. 0 Table 1"),
-    resonator_frequency=Datum(16e3, "Hz", "Rev. 0 p. 11; 13 to 19 kHz by Table 10"),
-    word_length=Datum(16, "1", "Rev. 0 Table 9"),
-    demodulator_bandwidth=Datum(10.6e3, "Hz", "Rev. 0 p. 11, three blocks below 5 us each", "calculated"),
-    thermometer_sensitivity=Datum(5.0, "LSB/degC", "Rev. 0 Table 1"),
-    thermometer_code=Datum(-100.0, "LSB", "0 LSB at 45 degC and 5 LSB/degC (Rev. 0 Table 1), at 25 degC", "calculated"),
-    self_heating=Datum(4.5, "K", "30 mW (Rev. 0 Table 1) through 150 K/W", "assumption"),
-    warm_up=Datum(60.0, "s", "small board in still air", "assumption"),
-)
-
-ADXL355 = AccelerometerSheet(
-    range=Datum(2.048, "g", "20-bit code at 256000 LSB/g", "calculated"),
-    sensitivity=Datum(256_000.0, "LSB/g", "Rev. D Table 2, +-2 g"),
-    noise_density=Datum(22.5, "ug/rtHz", "Rev. D Table 2, +-2 g, one-sided"),
-    bias_stability=Datum(3.5, "ug", "Rev. 0 Figure 56, Z axis, as quoted in public code", "driver"),
-    offset_temperature_slope=Datum(0.01, "mg/degC", "Rev. D Table 2, typical"),
-    word_length=Datum(20, "1", "Rev. D Table 2"),
-    sampling_frequency=Datum(4000.0, "Hz", "Rev. D p. 25, first decimation"),
-    overload=Datum(8.0, "g", "Rev. D p. 24, +-2 g range, +-25 %"),
-    thermometer_sensitivity=Datum(-9.05, "LSB/degC", "Rev. D Table 2"),
-    thermometer_code=Datum(1885.0, "LSB", "Rev. D Table 2, at 25 degC"),
-    self_heating=Datum(0.1, "K", "0.66 mW (Rev. D Table 2) through 150 K/W", "assumption"),
-    warm_up=Datum(60.0, "s", "small board in still air", "assumption"),
-)
+def _origin(field: _Field) -> Origin:
+    if field.key in field.part.tolerances:
+        return field.part.tolerances[field.key]
+    number = field.part.numbers[field.key]
+    return number if isinstance(number, Datum | Choice) else number[field.place[0] - 1]
 
 
-ADXL355_DELAYS = tuple(
-    Datum(value, "ms", "Rev. D p. 26, delay by output data rate, 4000 Hz first")
-    for value in (0.63, 1.00, 1.78, 3.26, 6.27, 12.34, 24.18, 47.59, 96.25, 189.58, 384.31)
-)
-ADXL355_HIGH_PASS = tuple(
-    Datum(value, "1", "Rev. D p. 27, corner over output data rate, codes 001 to 110")
-    for value in (24.7e-4, 6.2084e-4, 1.5545e-4, 0.3862e-4, 0.0954e-4, 0.0238e-4)
-)
-ADXL355_SELF_TEST = (
-    Datum(0.3, "g", "Rev. D Table 2, X and Y, typical"),
-    Datum(1.5, "g", "Rev. D Table 2, Z, typical"),
-)
-
-ADIS16354_SAMPLING_FREQUENCY = Datum(
-    819.2, "Hz", "driver registers, and sister sheet ADIS16350/55 Rev. B Table 17", "driver"
-)
-ADIS16354_BANDWIDTH = Datum(350.0, "Hz", "sister sheet Rev. B p. 19: 0.45 ms, one pole", "sister")
-ADIS16354_NULL_RESOLUTION = Datum(0.018315, "deg/s", "sister sheet Rev. B, xGYRO_OFF", "sister")
+def origins(name: str) -> dict[str, Origin]:
+    """Where each parameter of a device comes from."""
+    return {field.name: _origin(field) for field in _fields(device_called(name))}
 
 
-class Specimen(NamedTuple):
-    """What differs from one piece of hardware to the next: one board, its values within the datasheets' spread."""
-
-    gyro_clock_error: Vector3
-    gyro_bias: Vector3
-    gyro_bias_temperature_slope: Vector3
-    gyro_scale_error: Vector3
-    gyro_cross_axis: Matrix3
-    gyro_g_sensitivity: Matrix3
-    accelerometer_clock_error: float
-    accelerometer_bias: Vector3
-    accelerometer_bias_temperature_slope: Vector3
-    accelerometer_scale_error: Vector3
-    accelerometer_cross_axis: Matrix3
-    processor_clock_error: float
+def _common(field: _Field, origin: Origin) -> Any:
+    """What all pieces have in common; nothing, where they differ."""
+    if isinstance(origin, Choice):
+        assert isinstance(field.fact, Enumeration)
+        return field.fact.value(origin.item)
+    value = 0.0 if isinstance(origin, Tolerance) else origin.si
+    whole = isinstance(field.fact, Integer | Boolean)
+    return int(value) if whole else float(value)
 
 
-def _in_si(values: Vector3, unit: str) -> Vector3:
-    factor = _SI_FACTOR[unit]
-    return values[0] * factor, values[1] * factor, values[2] * factor
+def _deviation(tolerance: Tolerance, number: int, name: str) -> float:
+    """What piece `number` has, in the tolerance's unit; keyed by name, so that other parameters do not move it."""
+    key = (number, stream_of(tolerance.shared or name))
+    if tolerance.reading == "limits":
+        word = philox4x64((0, 0, 0, 0), key)[0]
+        return tolerance.mean + tolerance.size * (2.0 * ((word >> 11) + 0.5) * 2.0**-53 - 1.0)
+    is_limit = tolerance.reading == "three sigma"
+    sigma, limit = (tolerance.size / 3.0, tolerance.size) if is_limit else (tolerance.size, tolerance.limit)
+    drawn = (sigma * normals(key, call, 1)[0] for call in count())
+    return tolerance.mean + next(x for x in drawn if abs(x) <= limit)
 
 
-def _rows_in_si(rows: Matrix3, unit: str) -> Matrix3:
-    return _in_si(rows[0], unit), _in_si(rows[1], unit), _in_si(rows[2], unit)
+def specimen(name: str, number: int) -> dict[str, float]:
+    """What piece `number` of a device has of its own: errors drawn from its tolerances, all zero for number 0."""
+    if not 0 <= number < 2**31:
+        raise UnknownDeviceError(f"there is no specimen {number} of {name} (allowed: 0 to {2**31 - 1})")
+    drawn = {}
+    for field in _fields(device_called(name)):
+        origin = _origin(field)
+        if isinstance(origin, Tolerance):
+            # a reading's own axis is no other axis: its share is the scale error
+            own = field.key == "cross_axis" and field.place[0] == field.place[1]
+            drawn[field.name] = (
+                0.0 if own or number == 0 else in_si(_deviation(origin, number, field.name), origin.unit)
+            )
+    return drawn
 
 
-BOARD = Specimen(
-    # f0 may lie anywhere in 13..19 kHz (Rev. 0 Table 10); a few per cent apart: assumption
-    gyro_clock_error=_in_si((1.3, -0.8, 2.1), "%"),
-    # null 0.33 +- 0.42 deg/s at 25 degC (Rev. 0 histograms, SOIC)
-    gyro_bias=_in_si((0.52, -0.21, 0.38), "deg/s"),
-    # shares of the slope read off Figure 14: assumption
-    gyro_bias_temperature_slope=scale(ADXRS450.bias_temperature_slope.si, (0.73, -0.43, 0.93)),
-    # sensitivity 0.35 +- 0.42 % at 25 degC (Rev. 0 histograms, SOIC)
-    gyro_scale_error=_in_si((0.41, -0.18, 0.64), "%"),
-    # cross-axis +-3 % (Rev. 0 Table 1, typical column)
-    gyro_cross_axis=_rows_in_si(((0.0, 0.9, -1.4), (-1.1, 0.0, 0.7), (1.6, -0.5, 0.0)), "%"),
-    # each of the size in Table 1, directions: assumption
-    gyro_g_sensitivity=(
-        scale(ADXRS450.g_sensitivity.si, (0.60, -0.72, 0.35)),
-        scale(ADXRS450.g_sensitivity.si, (0.32, 0.80, -0.51)),
-        scale(ADXRS450.g_sensitivity.si, (-0.50, 0.37, 0.78)),
-    ),
-    # +-1.4 % device to device (Rev. D p. 25)
-    accelerometer_clock_error=0.6 * _SI_FACTOR["%"],
-    # 0 g offset +-25 mg typical (Rev. D Table 2)
-    accelerometer_bias=_in_si((11.0, -7.0, 16.0), "mg"),
-    accelerometer_bias_temperature_slope=scale(ADXL355.offset_temperature_slope.si, (1.0, -0.8, 1.2)),
-    # sensitivity within +-8 % (Rev. D Table 2 limits); well inside: assumption
-    accelerometer_scale_error=_in_si((0.8, -0.5, 1.1), "%"),
-    # cross-axis 1 % (Rev. D Table 2)
-    accelerometer_cross_axis=_rows_in_si(((0.0, 0.4, -0.3), (-0.4, 0.0, 0.5), (0.3, -0.5, 0.0)), "%"),
-    # crystal +-20..50 ppm (recalled), with the timer's own rounding below 7 ppm
-    processor_clock_error=18e-6,
-)
-"""The board that the sensor model has by default."""
+def parameters(name: str, number: int = 0) -> dict[str, Any]:
+    """Every parameter of a device, of piece `number`, by its structured name."""
+    common = {field.name: _common(field, _origin(field)) for field in _fields(device_called(name))}
+    return {**common, **specimen(name, number)}

@@ -1,7 +1,7 @@
 """The parts' digital low-passes.
 
 sinc^2, a triangular window, is built from block sums instead of a delay line. With A = sum x_k and B = sum k x_k over
-a block of n samples (k = 1..n), a triangle that rises over one block and falls over the next is
+a block of n samples (k = 0..n-1), a triangle that rises over one block and falls over the next is
 (B_previous + n A - B)/n^2. Read twice a block, it needs four half blocks; the partial sums of windows under way are
 all that is kept.
 
@@ -28,10 +28,16 @@ class BlockSums(NamedTuple):
 EMPTY = BlockSums(0.0, 0.0, 0.0)
 
 
-def with_samples(sums: BlockSums, x: Scalar, count: float) -> BlockSums:
-    """The block after `count` more samples of the same value."""
+def with_samples(sums: BlockSums, before: Scalar, now: Scalar, count: float) -> BlockSums:
+    """The block after `count` more samples on a straight line, the last of them `now`, the one ahead of them `before`.
+
+    Sample i = 0..n-1 of them is before + (i + 1)/n (now - before).
+    """
     a, b, samples = sums
-    return BlockSums(a + count * x, b + count * x * (samples + 0.5 * (count + 1.0)), samples + count)
+    more = 0.5 * ((count - 1.0) * before + (count + 1.0) * now)
+    late = (count * count - 1.0) / 3.0
+    weighted = (0.5 * count * (count - 1.0) - late) * before + late * now
+    return BlockSums(a + more, b + samples * more + weighted, samples + count)
 
 
 def sinc2_decimated(rising: Scalar, a: Scalar, b: Scalar, n: Scalar) -> tuple[Scalar, Scalar]:
@@ -53,7 +59,7 @@ class OverlappedWindows(NamedTuple):
 def sinc2_overlapped(windows: OverlappedWindows, a: Scalar, b: Scalar, n: Scalar) -> tuple[Scalar, OverlappedWindows]:
     """Output of a triangle of half width 2n at the end of a block of n, and the windows under way.
 
-    The weights over four blocks are k, n + k, 2n - k, n - k.
+    The weights over four blocks are k, n + k, 2n - k, n - k, with k = 0 for a block's first sample.
     """
     first, second, third = windows
     y = (third + n * a - b) / (4.0 * n * n)
@@ -62,7 +68,7 @@ def sinc2_overlapped(windows: OverlappedWindows, a: Scalar, b: Scalar, n: Scalar
 
 def settled_windows(x: Scalar, n: Scalar) -> OverlappedWindows:
     """The windows after a long constant input x."""
-    a, b = n * x, 0.5 * n * (n + 1.0) * x
+    a, b = n * x, 0.5 * n * (n - 1.0) * x
     first, second = b, b + n * a + b
     return OverlappedWindows(first, second, second + 2.0 * n * a - b)
 
@@ -103,8 +109,8 @@ class DelayLines(NamedTuple):
 class BartlettSums(NamedTuple):
     """The sums under way of the two moving averages."""
 
-    first: Annotated[float, Integer("sum over the samples")]
-    second: Annotated[float, Integer("sum over the sums")]
+    first: Annotated[float, Integer("sum over the samples", hidden=True)]
+    second: Annotated[float, Integer("sum over the sums", hidden=True)]
 
 
 def settled_bartlett(code: Scalar, taps: Scalar) -> tuple[BartlettSums, DelayLines]:

@@ -4,7 +4,7 @@ The signal's way: sensitivity and mounting, bandwidth, temperature, g-sensitivit
 filter; offset, fault, range, register word. Two digital filters are offered:
 
 * ``cic``, the ADXRS450's sinc^2 over 128/f0: sensed at f0/8, register updated at f0/32;
-* ``bartlett_1`` to ``bartlett_64``, the ADIS16354's at every sample.
+* ``bartlett_1`` to ``bartlett_64``, the ADIS16354's at every sample, four inputs a conversion.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 from ..record import Boolean, Enumeration, Integer, Item, Matrix3, Real, Vector3
-from ..scalar import Scalar, clip, round_half_up, where
+from ..scalar import Scalar, clip, either, maximum, round_half_up, where
 from ..system import STOPPED
 from ..vectors import dot, each_axis, matrix_product
-from . import devices
+from .adxrs450_sheet import ADXRS450
 from .bandwidth import low_pass, low_pass_gain
 from .bias_instability import SIGMA_PER_INSTABILITY
+from .board import BOARD
 from .digital_filter import (
     BARTLETT_ITEMS,
     CONVERTER_STEPS,
@@ -41,8 +42,6 @@ from .sensitivity import bent, cubic_gains, sensitivity_matrix
 from .thermal import ThermalParameters, ThermometerParameters
 from .white_noise import block_sums, sample_deviation
 
-_SHEET = devices.ADXRS450
-_BOARD = devices.BOARD
 SAMPLES_PER_REGISTER = 32
 """ADXRS450: f0 over the register's rate (Rev. 0 p. 11); the window is four times as long."""
 SENSES_PER_REGISTER = 4
@@ -61,46 +60,48 @@ AUTONULL = Enumeration(
 )
 NULL_DURATION = 30.0
 """s of the ADIS16354's precision null."""
+NULL_CODES = (-4096.0, 4095.0)
+"""Smallest and largest offset register: 13 bits."""
 
 
 class GyroParameters(NamedTuple):
     """A triad of gyros and what is peculiar to this board's three."""
 
     filter: Annotated[int, GYRO_FILTER] = GYRO_FILTER.value("cic")
-    range: Annotated[float, Real("rad/s", "full scale", min=1e-3, display="deg/s")] = _SHEET.range.si
+    range: Annotated[float, Real("rad/s", "full scale", min=1e-3, display="deg/s")] = ADXRS450.si("range")
     resolution: Annotated[float, Real("rad/s", "one LSB of the rate register", min=1e-12, display="deg/s")] = (
-        1.0 / _SHEET.sensitivity.si
+        ADXRS450.si("resolution")
     )
-    code_limit: Annotated[float, Integer("codes run from minus this to one less", min=2, max=2**31 - 1)] = 2 ** (
-        int(_SHEET.word_length.value) - 1
+    code_limit: Annotated[float, Integer("codes run from minus this to one less", min=2, max=2**31 - 1)] = int(
+        ADXRS450.si("code_limit")
     )
-    noise_density: Annotated[float, Real("rad/(s.Hz^0.5)", "white rate noise, one-sided", min=0.0)] = (
-        _SHEET.noise_density.si
+    noise_density: Annotated[float, Real("rad/(s.Hz^0.5)", "white rate noise, one-sided", min=0.0)] = ADXRS450.si(
+        "noise_density"
     )
     bias_instability: Annotated[float, Real("rad/s", "flicker of the bias, IEEE 952 B", min=0.0, display="deg/h")] = (
-        _SHEET.bias_stability.si * devices.ALLAN_MINIMUM_TO_BIAS_INSTABILITY
+        ADXRS450.si("bias_instability")
     )
     rate_random_walk: Annotated[float, Real("rad/(s.s^0.5)", "random walk of the bias, IEEE 952 K", min=0.0)] = 0.0
     turn_on_bias: Annotated[
         float, Real("rad/s", "standard deviation of the bias from run to run", min=0.0, display="deg/s")
     ] = 0.0
-    bandwidth: Annotated[float, Real("Hz", "analogue bandwidth before the digital filter", min=1.0)] = (
-        _SHEET.demodulator_bandwidth.si
+    bandwidth: Annotated[float, Real("Hz", "analogue bandwidth before the digital filter", min=1.0)] = ADXRS450.si(
+        "bandwidth"
     )
     resonator_frequency: Annotated[
         float, Real("Hz", "nominal f0, from which every rate of the part with a CIC follows", min=1e3, max=1e5)
-    ] = _SHEET.resonator_frequency.si
+    ] = ADXRS450.si("resonator_frequency")
     sampling_frequency: Annotated[
         float, Real("Hz", "nominal conversion rate of the part with a Bartlett filter", min=1.0, max=1e5)
-    ] = devices.ADIS16354_SAMPLING_FREQUENCY.si
+    ] = ADXRS450.si("sampling_frequency")
     divider: Annotated[int, Integer("conversions per sample of the Bartlett filter", min=1, max=4096)] = 1
     clock_error: Annotated[Vector3, Real("1", "relative error of the part's clock", min=-0.25, max=0.25)] = (
-        _BOARD.gyro_clock_error
+        BOARD.gyro_clock_error
     )
     clock_jitter: Annotated[float, Real("s", "standard deviation of the moment of a sample", min=0.0, max=1e-2)] = 0.0
-    bias: Annotated[Vector3, Real("rad/s", "null offset at 25 degC", display="deg/s")] = _BOARD.gyro_bias
+    bias: Annotated[Vector3, Real("rad/s", "null offset at 25 degC", display="deg/s")] = BOARD.gyro_bias
     bias_temperature_slope: Annotated[Vector3, Real("rad/(s.K)", "change of the offset with temperature")] = (
-        _BOARD.gyro_bias_temperature_slope
+        BOARD.gyro_bias_temperature_slope
     )
     bias_temperature_curve: Annotated[Vector3, Real("rad/(s.K2)", "change of the offset with temperature squared")] = (
         0.0,
@@ -115,7 +116,7 @@ class GyroParameters(NamedTuple):
     )
     supply_sensitivity: Annotated[float, Real("rad/(s.V)", "change of the offset with the supply voltage")] = 0.0
     scale_error: Annotated[Vector3, Real("1", "relative error of the sensitivity", min=-0.5, max=0.5)] = (
-        _BOARD.gyro_scale_error
+        BOARD.gyro_scale_error
     )
     scale_temperature_slope: Annotated[Vector3, Real("1/K", "relative change of the sensitivity with temperature")] = (
         0.0,
@@ -127,9 +128,9 @@ class GyroParameters(NamedTuple):
     ] = (0.0, 0.0, 0.0)
     nonlinearity: Annotated[
         float, Real("1", "rms deviation from the best straight line, of the full scale", min=0.0, max=0.1)
-    ] = 0.0
+    ] = ADXRS450.si("nonlinearity")
     cross_axis: Annotated[Matrix3, Real("1", "share of the column's axis in the row's reading", min=-0.5, max=0.5)] = (
-        _BOARD.gyro_cross_axis
+        BOARD.gyro_cross_axis
     )
     nonorthogonality: Annotated[
         Vector3,
@@ -146,12 +147,14 @@ class GyroParameters(NamedTuple):
         0.0,
     )
     g_sensitivity: Annotated[Matrix3, Real("rad.s/m", "reading of the row's gyro by specific force of the column")] = (
-        _BOARD.gyro_g_sensitivity
+        BOARD.gyro_g_sensitivity
     )
-    rectification: Annotated[Vector3, Real("rad.s3/m2", "offset by the square of the specific force")] = (0.0, 0.0, 0.0)
+    rectification: Annotated[Vector3, Real("rad.s3/m2", "offset by the square of the specific force")] = (
+        ADXRS450.of_each_axis("rectification")
+    )
     autonull: Annotated[int, AUTONULL] = AUTONULL.value("none")
     null_resolution: Annotated[float, Real("rad/s", "one LSB of the offset registers", min=1e-12, display="deg/s")] = (
-        devices.ADIS16354_NULL_RESOLUTION.si
+        ADXRS450.si("null_resolution")
     )
     self_test_response: Annotated[Vector3, Real("rad/s", "reading that the self-test adds", display="deg/s")] = (
         0.0,
@@ -160,9 +163,9 @@ class GyroParameters(NamedTuple):
     )
     self_test: Annotated[bool, Boolean("the self-test is on", tunable=True)] = False
     thermometer: ThermometerParameters = ThermometerParameters(
-        _SHEET.thermometer_sensitivity.si, _SHEET.thermometer_code.si
+        ADXRS450.si("thermometer.sensitivity"), ADXRS450.si("thermometer.code_at_25")
     )
-    thermal: ThermalParameters = ThermalParameters(_SHEET.self_heating.si, _SHEET.warm_up.si)
+    thermal: ThermalParameters = ThermalParameters(ADXRS450.si("thermal.self_heating"), ADXRS450.si("thermal.warm_up"))
 
 
 class GyroCoefficients(NamedTuple):
@@ -176,14 +179,15 @@ class GyroCoefficients(NamedTuple):
     low_pass_gain: Annotated[Vector3, Real("1", "share of a step taken over in a sense period")]
     sample_deviation: Annotated[Vector3, Real("rad/s", "white noise of a sample")]
     instability_sigma: Annotated[float, Real("rad/s", "standard deviation of one Gauss-Markov process of the bias")]
-    null_words: Annotated[Vector3, Integer("register words averaged for the bias null")]
+    null_words: Annotated[Vector3, Integer("register words averaged for the bias null, 0: none")]
+    senses: Annotated[float, Integer("inputs taken per register word")]
 
 
 class NullState(NamedTuple):
     """The bias null of the part."""
 
     sum: Annotated[float, Integer("sum of the codes so far")]
-    offset: Annotated[float, Integer("offset register, added to the code")]
+    offset: Annotated[float, Integer("offset register")]
     done: Annotated[float, Boolean("the null has ended")]
 
 
@@ -194,7 +198,7 @@ class GyroState(NamedTuple):
     sensed: Annotated[float, Real("rad/s", "rate and what specific force adds to it, as last sensed")]
     block: Annotated[BlockSums, Real("rad/s", "sums of the block under way")]
     windows: Annotated[OverlappedWindows, Real("rad/s", "partial sums of the windows under way")]
-    mean: Annotated[float, Real("rad/s", "mean of the last block")]
+    mean: Annotated[float, Real("rad/s", "mean over the last block, or since the input before")]
     sums: BartlettSums
     words: Annotated[float, Real("1", "register words so far")]
     null: NullState
@@ -206,16 +210,14 @@ class GyroState(NamedTuple):
 def gyro_coefficients(gyro: GyroParameters, mounting: Matrix3, ideal: Any) -> GyroCoefficients:
     """Coefficients of the triad; an ideal one is read directly, its clocks stand still."""
     perfect, is_cic = ideal > 0.5, gyro.filter == GYRO_FILTER.value("cic")
-    sampled = gyro.sampling_frequency / gyro.divider
-
-    def frequency(i: int) -> Scalar:
-        return where(is_cic, gyro.resonator_frequency, sampled) * (1.0 + gyro.clock_error[i])
-
     # the converter samples noise of its full rate, however seldom it is read
-    noisy = each_axis(lambda i: where(is_cic, frequency(i), gyro.sampling_frequency * (1.0 + gyro.clock_error[i])))
-    period = each_axis(lambda i: where(is_cic, float(SAMPLES_PER_SENSE), 1.0) / frequency(i))
-    word = each_axis(lambda i: where(is_cic, float(SAMPLES_PER_REGISTER), 1.0) / frequency(i))
+    nominal = where(is_cic, gyro.resonator_frequency, gyro.sampling_frequency)
+    frequency = each_axis(lambda i: nominal * (1.0 + gyro.clock_error[i]))
+    senses = where(is_cic, 1.0, 1.0 * gyro.divider) * SENSES_PER_REGISTER
+    period = each_axis(lambda i: where(is_cic, float(SAMPLES_PER_SENSE), 1.0 / SENSES_PER_REGISTER) / frequency[i])
+    word = each_axis(lambda i: senses * period[i])
     precise = gyro.autonull == AUTONULL.value("precision")
+    idle = either(perfect, gyro.autonull == AUTONULL.value("none"))
     return GyroCoefficients(
         sensitivity=sensitivity_matrix(
             gyro.scale_error, gyro.cross_axis, gyro.nonorthogonality, gyro.misalignment, mounting
@@ -225,15 +227,16 @@ def gyro_coefficients(gyro: GyroParameters, mounting: Matrix3, ideal: Any) -> Gy
         sense_period=each_axis(lambda i: where(perfect, STOPPED, period[i])),
         word_period=word,
         low_pass_gain=each_axis(lambda i: low_pass_gain(gyro.bandwidth, period[i])),
-        sample_deviation=each_axis(lambda i: sample_deviation(gyro.noise_density, noisy[i])),
+        sample_deviation=each_axis(lambda i: sample_deviation(gyro.noise_density, frequency[i])),
         instability_sigma=gyro.bias_instability * SIGMA_PER_INSTABILITY,
-        null_words=each_axis(lambda i: where(precise, round_half_up(NULL_DURATION / word[i]), 1.0)),
+        null_words=each_axis(lambda i: where(idle, 0.0, where(precise, round_half_up(NULL_DURATION / word[i]), 1.0))),
+        senses=senses,
     )
 
 
-def initial_null(gyro: GyroParameters) -> NullState:
-    """The bias null before the first word; done where none is asked for."""
-    return NullState(0.0, 0.0, where(gyro.autonull == AUTONULL.value("none"), 1.0, 0.0))
+def initial_null(words: Scalar) -> NullState:
+    """The bias null before the first of so many words; done where there are none."""
+    return NullState(0.0, 0.0, where(words < 0.5, 1.0, 0.0))
 
 
 def _sensed(
@@ -258,7 +261,8 @@ def _word(
     """Words so far, bias null, code, over-range and condition after one more word of this value."""
     words = gyro.words + 1.0
     time = words * k.word_period[axis]
-    value = value + offset + where(p.self_test > 0.5, p.self_test_response[axis], 0.0)
+    value = value + offset + gyro.null.offset * p.null_resolution
+    value = value + where(p.self_test > 0.5, p.self_test_response[axis], 0.0)
     stuck: Scalar = 0.0
     dropped: Scalar = 0.0
     for fault in faults:
@@ -266,8 +270,7 @@ def _word(
         value, stuck, dropped = found.value, stuck + found.stuck, dropped + found.dropped
     fresh = register_code(value, p.range, p.resolution, p.code_limit)
     null = nulled(gyro.null, fresh, words, axis, p, k)
-    code = clip(fresh + null.offset, -p.code_limit, p.code_limit - 1.0)
-    code = where(dropped > 0.5, 0.0, where(stuck > 0.5, gyro.code, code))
+    code = where(dropped > 0.5, 0.0, where(stuck > 0.5, gyro.code, fresh))
     return words, null, code, over_range(value, p.range), condition_of(stuck, dropped)
 
 
@@ -277,9 +280,14 @@ def nulled(
     """The bias null after one more word: offset = -mean, in whole LSB of the offset register."""
     total = null.sum + where(null.done > 0.5, 0.0, code)
     ends = where(null.done > 0.5, 0.0, where(words >= k.null_words[axis], 1.0, 0.0))
-    steps = round_half_up(-(total / k.null_words[axis]) * (p.resolution / p.null_resolution))
-    offset = round_half_up(clip(steps, -4096.0, 4095.0) * (p.null_resolution / p.resolution))
+    steps = round_half_up(-(total / maximum(k.null_words[axis], 1.0)) * (p.resolution / p.null_resolution))
+    offset = clip(steps, *NULL_CODES)
     return NullState(total, where(ends > 0.5, offset, null.offset), where(ends > 0.5, 1.0, null.done))
+
+
+def _converted(value: Scalar, p: GyroParameters) -> Scalar:
+    """What the ADIS16354's converter makes of a rate; it goes on to twice the range."""
+    return converted(clip(value, -2.0 * p.range, 2.0 * p.range), p.resolution)
 
 
 def initial_gyro(
@@ -298,9 +306,11 @@ def initial_gyro(
     code = register_code(sensed + offset, p.range, p.resolution, p.code_limit)
     settled = settled_windows(sensed, float(SAMPLES_PER_REGISTER))
     taps = taps_of(p.filter, GYRO_FILTER.value("bartlett_1"))
-    sums, lines = settled_bartlett(converted(sensed + offset, p.resolution), taps)
+    sums, lines = settled_bartlett(_converted(sensed + offset, p), taps)
     beyond = over_range(sensed + offset, p.range)
-    state = GyroState(passed, sensed, EMPTY, settled, sensed, sums, 0.0, initial_null(p), code, beyond, 0.0)
+    state = GyroState(
+        passed, sensed, EMPTY, settled, sensed, sums, 0.0, initial_null(k.null_words[axis]), code, beyond, 0.0
+    )
     return state, lines
 
 
@@ -310,15 +320,27 @@ Sense = Callable[[GyroState, Vector3, Vector3, Scalar, GyroParameters, GyroCoeff
 def sense(axis: int) -> Sense:
     """Step of one CIC gyro at f0/8: the true rate and specific force enter the block.
 
-    The eight samples since the last step are taken at their mean, half way between what was sensed then and now.
+    The eight samples since the last step are taken on a straight line from what was sensed then to what is now.
     """
 
     def step(
         gyro: GyroState, rate: Vector3, force: Vector3, scale: Scalar, p: GyroParameters, k: GyroCoefficients
     ) -> GyroState:
         passed, sensed = _sensed(axis, gyro, rate, force, scale, p, k)
-        block = with_samples(gyro.block, 0.5 * (gyro.sensed + sensed), float(SAMPLES_PER_SENSE))
+        block = with_samples(gyro.block, gyro.sensed, sensed, float(SAMPLES_PER_SENSE))
         return GyroState(passed, sensed, block, *gyro[3:])
+
+    return step
+
+
+def sense_bartlett(axis: int) -> Sense:
+    """Step of one Bartlett gyro at four times its conversions: the true rate and specific force pass the bandwidth."""
+
+    def step(
+        gyro: GyroState, rate: Vector3, force: Vector3, scale: Scalar, p: GyroParameters, k: GyroCoefficients
+    ) -> GyroState:
+        passed, sensed = _sensed(axis, gyro, rate, force, scale, p, k)
+        return GyroState(passed, sensed, gyro.block, gyro.windows, 0.5 * (gyro.sensed + sensed), *gyro[5:])
 
     return step
 
@@ -354,30 +376,22 @@ Sample = Callable[..., tuple[GyroState, DelayLines]]
 
 
 def sample(axis: int, taps: int) -> Sample:
-    """Step of one Bartlett gyro: bandwidth, noise, offset, converter, filter of `taps`, fault, range, register word."""
+    """Step of one Bartlett gyro at its sampling rate: noise, offset, filter of `taps`, fault, range, register word."""
 
     def step(
         gyro: GyroState,
         lines: DelayLines,
-        rate: Vector3,
-        force: Vector3,
-        scale: Scalar,
         offset: Scalar,
         p: GyroParameters,
         k: GyroCoefficients,
         faults: tuple[FaultParameters, ...],
         draws: tuple[Scalar, ...],
     ) -> tuple[GyroState, DelayLines]:
-        passed, sensed = _sensed(axis, gyro, rate, force, scale, p, k)
-        jitter = (sensed - gyro.sensed) / k.sense_period[axis] * (p.clock_jitter * draws[2])
-        noisy = sensed + jitter + k.sample_deviation[axis] * draws[0] + offset
-        limited = clip(noisy, -2.0 * p.range, 2.0 * p.range)
-        y, sums, after = bartlett(gyro.sums, lines, converted(limited, p.resolution), taps)
+        jitter = (gyro.sensed - gyro.mean) * (2.0 / k.sense_period[axis]) * (p.clock_jitter * draws[2])
+        noisy = gyro.mean + jitter + k.sample_deviation[axis] * draws[0] + offset
+        y, sums, after = bartlett(gyro.sums, lines, _converted(noisy, p), taps)
         value = y * (p.resolution / CONVERTER_STEPS)
         words, null, code, beyond, condition = _word(axis, gyro, value, 0.0, p, k, faults, draws[3])
-        state = GyroState(
-            passed, sensed, gyro.block, gyro.windows, gyro.mean, sums, words, null, code, beyond, condition
-        )
-        return state, after
+        return GyroState(*gyro[:5], sums, words, null, code, beyond, condition), after
 
     return step

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..record import Matrix3, Vector3
 from ..scalar import Scalar, cos, maximum, minimum, sin, sqrt, where
 from ..vectors import each_axis, matrix_product
-from .devices import REFERENCE_TEMPERATURE
+from .datasheet import REFERENCE_TEMPERATURE
 
 _CUBIC_RESIDUAL = 0.15118578920369088
 """rms of u^3 - 3/5 u over -1..1, sqrt(1/7 - 6/25 + 9/75): what a straight line leaves of a cubic."""
@@ -27,9 +27,10 @@ def rotation_matrix(rotation: Vector3) -> Matrix3:
 
 
 def skewed_axes(nonorthogonality: Vector3) -> Matrix3:
-    """Rows: a triad whose y leans to x, z to x and z to y by these angles."""
+    """Rows: a triad whose y leans to x, z to x and z to y by these angles, each less than a right angle apart."""
     yx, zx, zy = nonorthogonality
-    a, b = sin(zx), sin(zy)
+    a = sin(zx)
+    b = (sin(zy) - a * sin(yx)) / cos(yx)
     return (1.0, 0.0, 0.0), (sin(yx), cos(yx), 0.0), (a, b, sqrt(1.0 - a * a - b * b))
 
 

@@ -8,6 +8,7 @@ import pytest
 from slave_building import build
 
 from attitude_fmu.cosim.system import Component, System, connect
+from attitude_fmu.fmu_src.build import build_all
 
 
 @pytest.fixture(scope="session")
@@ -27,3 +28,11 @@ def decay(fmus: dict[str, Path]) -> System:
         (*connect("integrator", "gain", ("x", "u")), *connect("gain", "integrator", ("y", "u"))),
         stop_time=1.0,
     ).with_values("start", {"integrator.x0": 1.0})
+
+
+@pytest.fixture(scope="session")
+def sensor_dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the native FMU of the attitude sensor."""
+    folder = tmp_path_factory.mktemp("sensor")
+    build_all(folder, ["AttitudeSensor"])
+    return folder

@@ -20,9 +20,9 @@ from attitude_fmu.models.attitude_sensor import FILTER, MODEL, SOLVER, Inputs, P
 from attitude_fmu.models.errors import ValueRefusedError
 from attitude_fmu.models.filters.kalman import kalman_filtered
 from attitude_fmu.models.record import check, defaults, flatten
-from attitude_fmu.models.sensors import devices
+from attitude_fmu.models.sensors.datasheet import REFERENCE_TEMPERATURE
 from attitude_fmu.models.system import Run
-from attitude_fmu.models.vectors import add, multiply_transposed
+from attitude_fmu.models.vectors import ZERO3, add, multiply_transposed
 
 REAL: Parameters = defaults(Parameters)
 IDEAL = REAL._replace(ideal=True)
@@ -33,7 +33,7 @@ def with_parts(parameters: Any, **parts: dict[str, Any]) -> Any:
     return parameters._replace(**{name: getattr(parameters, name)._replace(**fields) for name, fields in parts.items()})
 
 
-def at_rest(euler: Euler, latitude: float, temperature: float = devices.REFERENCE_TEMPERATURE) -> Inputs:
+def at_rest(euler: Euler, latitude: float, temperature: float = REFERENCE_TEMPERATURE) -> Inputs:
     """What a body at rest on the turning Earth feels."""
     c_nb = matrix_from_euler(euler)
     return Inputs(
@@ -148,12 +148,12 @@ def test_white_noise_of_every_channel_of_a_resting_device_is_that_of_its_datashe
 def test_registers_show_offset_scale_and_temperature_as_the_parameters_say() -> None:
     quiet = with_parts(
         REAL,
-        gyro={"noise_density": 0.0, "bias_instability": 0.0},
-        accelerometer={"noise_density": 0.0, "bias_instability": 0.0},
+        gyro={"noise_density": 0.0, "bias_instability": 0.0, "nonlinearity": 0.0, "rectification": ZERO3},
+        accelerometer={"noise_density": 0.0, "bias_instability": 0.0, "nonlinearity": 0.0},
     )
     warm = at_rest(Euler(0.0, 0.0, 0.0), 0.0, temperature=313.15)._replace(rate=(0.5, 0.0, 0.0))
     shown = settled(quiet, warm, 1.0).outputs()
-    rise = 313.15 + quiet.gyro.thermal.self_heating - devices.REFERENCE_TEMPERATURE
+    rise = 313.15 + quiet.gyro.thermal.self_heating - REFERENCE_TEMPERATURE
     g = quiet.gyro
     expected = (
         0.5 * (1 + g.scale_error[0])
@@ -163,7 +163,7 @@ def test_registers_show_offset_scale_and_temperature_as_the_parameters_say() -> 
     )
     assert shown.register.rate[0] == math.floor(expected / g.resolution + 0.5)
     a = quiet.accelerometer
-    rise = 313.15 + a.thermal.self_heating - devices.REFERENCE_TEMPERATURE
+    rise = 313.15 + a.thermal.self_heating - REFERENCE_TEMPERATURE
     expected = STANDARD_GRAVITY * (1 + a.scale_error[2]) + a.bias[2] + a.bias_temperature_slope[2] * rise
     assert shown.register.acceleration[2] == math.floor(expected / a.resolution + 0.5)
     assert shown.die_temperature.gyro == pytest.approx(313.15 + g.thermal.self_heating)

@@ -67,7 +67,7 @@ class Facts:
         self.limits = [limits_of(variable) for variable in self.variables[: self.settable]]
         self.layout = Layout(model, interface)
         self.of_kind: dict[str, list[int]] = {"Real": [], "Integer": [], "Boolean": [], "String": []}
-        for variable in self.variables:
+        for variable in interface.shown:
             self.of_kind[self.kind(variable)].append(variable.value_reference)
 
     @staticmethod
@@ -77,7 +77,10 @@ class Facts:
 
     def reaches(self, kind: str, references: Sequence[int]) -> bool:
         """Whether all of these are variables of a kind."""
-        return all(r < len(self.variables) and self.kind(self.variables[r]) == kind for r in references)
+        known = len(self.variables)
+        return all(
+            r < known and self.kind(self.variables[r]) == kind and not self.variables[r].is_hidden for r in references
+        )
 
 
 class Twin:

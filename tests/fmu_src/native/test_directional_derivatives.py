@@ -133,7 +133,11 @@ def _compare(unit: Instance, function: Function, at: Values, knowns: list[str]) 
             if spread > 1e-3 * abs(fine[unknown]) + noise:
                 continue
             trusted += 1
-            assert abs(derivative - fine[unknown]) <= 2e-3 * abs(fine[unknown]) + 4.0 * noise, (unknown, known)
+            wrong = abs(derivative - fine[unknown]) > 2e-3 * abs(fine[unknown]) + 4.0 * noise
+            if wrong:  # two differences across a rounding may agree by chance, a third does not
+                third = _difference(function, at, known, 0.31 * step)[unknown]
+                wrong = abs(third - fine[unknown]) <= 2e-3 * abs(fine[unknown]) + 4.0 * noise
+            assert not wrong, (unknown, known)
     return trusted, len(knowns) * len(value)
 
 
@@ -152,8 +156,11 @@ def test_after_steps_they_are_those_by_parameters_and_the_state(unit: Instance, 
     for name, value in values.items():
         unit[name] = value
     unit.initialise().step(5, 7.3e-3)
-    values |= {f"state.{leaf.name}": float(unit[f"state.{leaf.name}"]) for leaf in leaves(model.State)}
-    knowns = _knowns(model, {"": model.Parameters, "state.": model.State})
+    # no output follows from hidden state
+    values |= {name: float(unit[name]) if name in unit.variables else 0.0 for name in _state(model)}
+    knowns = _knowns(model, {"": model.Parameters}) + [
+        n for n in _knowns(model, {"state.": model.State}) if n in unit.variables
+    ]
     trusted, total = _compare(unit, _while_running(model), values, knowns)
     assert trusted > 0.9 * total
 
@@ -163,6 +170,10 @@ def test_after_initialisation_outputs_do_not_move_with_inputs(unit: Instance, mo
     inputs = dict.fromkeys(_knowns(model, {"": model.Inputs}), 1.0)
     unknowns = list(_at_initialisation(model)(_starts(model)))
     assert set(_derivatives(unit, unknowns, inputs).values()) == {0.0}
+
+
+def _state(model: Model) -> list[str]:
+    return [f"state.{leaf.name}" for leaf in leaves(model.State)]
 
 
 def _starts(model: Model) -> Values:

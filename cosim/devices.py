@@ -1,0 +1,65 @@
+"""Sensors as parameter sets: `device_parameters` for a `System`, `write_device` for an ``.ssv`` file.
+
+``device_parameters("ADIS16354_150", 3)`` makes the component ``sensor`` of a system piece 3 of that device; later
+sets override single numbers. A set without component, ``component=""``, has the plain names of the FMU: so does an
+``.ssv`` that an ``.ssp`` binds to the component itself, which every SSP tool reads.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..fmu_src.units import BASE_UNITS, parse
+from ..models.attitude_sensor import MODEL
+from ..models.record import Boolean, Enumeration, Fact, Integer, leaves
+from ..models.sensors.devices import parameters
+from .interface import Interface, Item, Unit, Variable
+from .ssp import write_ssv
+from .system import ParameterSet
+
+
+def device_parameters(device: str, specimen: int = 0, component: str = "sensor") -> ParameterSet:
+    """Every parameter of a device and of one piece of it, for the attitude sensor that is called `component`.
+
+    Raises `UnknownDeviceError` (an `AttitudeFmuError`) for a device or specimen that there is not.
+    """
+    prefix = f"{component}." if component else ""
+    values = {f"{prefix}{name}": value for name, value in parameters(device, specimen).items()}
+    units = {f"{prefix}{name}": unit for name, unit in _units().items() if f"{prefix}{name}" in values}
+    return ParameterSet(f"{device}_specimen_{specimen}" if specimen else device, values, units)
+
+
+def write_device(path: Path, device: str, specimen: int = 0, component: str = "sensor") -> Path:
+    """Write those parameters, with their units, as an ``.ssv`` file.
+
+    Raises `ResultsError` if the file cannot be written.
+    """
+    variables = {name: _variable(name, fact) for name, fact in _facts().items()}
+    interface = Interface(MODEL.name, variables, {}, None)
+    return write_ssv(device_parameters(device, specimen, component), path, {component: interface})
+
+
+def _facts() -> dict[str, Fact]:
+    return {leaf.name: leaf.fact for leaf in leaves(MODEL.Parameters)}
+
+
+def _is_real(fact: Fact) -> bool:
+    return not isinstance(fact, Integer | Boolean | Enumeration)
+
+
+def _units() -> dict[str, Unit]:
+    """Units of the parameters; not those that a set cannot define, with roots in them, nor the unit 1."""
+    found = {}
+    for name, fact in _facts().items():
+        unit = parse(fact.unit)
+        if _is_real(fact) and unit.exponents and unit.is_whole:
+            exponents = tuple(int(unit.exponents.get(symbol, 0)) for symbol in BASE_UNITS)
+            found[name] = Unit(fact.unit, exponents, unit.factor, 0.0)
+    return found
+
+
+def _variable(name: str, fact: Fact) -> Variable:
+    items = tuple(Item(item.name, i) for i, item in enumerate(getattr(fact, "items", ()), 1))
+    unit = fact.unit if _is_real(fact) else None
+    kind = type(fact).__name__
+    return Variable(name, 0, kind, "parameter", "fixed", "exact", unit, None, fact.description, None, items)

@@ -1,0 +1,379 @@
+"""The pictures of `attitude-fmu sensor`: six panels for each part, what was measured beside what the sheets say."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from attitude_fmu.models.sensors import bias_instability
+from attitude_fmu.models.sensors.datasheet import UNSURE, Datum, Origin, Tolerance
+
+from .allan import FLICKER_FLOOR, combined, modelled_instability, pooled, rate_random_walk, rounding, white_noise
+from .bench import Array
+from .characteristics import Part, Response, Sensor
+from .filter_claims import HALF_POWER
+from .identification import power_spectrum
+from .plot import STYLE
+from .sensor_findings import Findings, word_period
+from .sensor_report import UNITS, bounds, shown
+from .workspace import whole_or_not
+
+# matplotlib is imported where a picture is made: most commands need none
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's palette, which colour-blind readers can tell apart
+_AXES = {"x": "#0072B2", "y": "#009E73", "z": "#CC79A7"}
+_MODEL, _SHEET, _THEORY, _REST = "#0072B2", "#D55E00", "#333333", "#B8C4CC"
+_MINUS = "\N{MINUS SIGN}"
+_SEGMENTS = (8, 64, 1024)
+"""Spectra of ever shorter segments are joined: fine at low frequencies, smooth at high ones."""
+
+
+class Sheet(NamedTuple):
+    """What a picture says besides what was measured: the part's name, how it was run, the sheet's numbers, the sum."""
+
+    name: str
+    heading: str
+    origins: Mapping[str, Origin]
+    summary: str
+
+
+class _Drawn(NamedTuple):
+    sensor: Sensor
+    found: Findings
+    sheet: Sheet
+
+    @property
+    def part(self) -> Part:
+        return self.found.part
+
+    def modelled(self, name: str) -> float:
+        """The value of one of the part's parameters."""
+        return self.sensor.number(f"{self.part}.{name}")
+
+    def datum(self, name: str) -> Datum | None:
+        """The sheet's number for it, None where there is none or it is zero for want of one."""
+        origin = self.sheet.origins.get(f"{self.part}.{name}")
+        return origin if isinstance(origin, Datum) and origin.value != 0.0 else None
+
+
+def plot_sensor(path: Path, sensor: Sensor, found: Findings, sheet: Sheet) -> Path:
+    """Draw one part into a PNG file.
+
+    Raises `ResultsError` if the file cannot be written.
+    """
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    drawn = _Drawn(sensor, found, sheet)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(13.0, 8.0), dpi=130)
+        _headings(figure, drawn)
+        grid = figure.add_gridspec(2, 3, left=0.06, right=0.985, top=0.855, bottom=0.075, hspace=0.36, wspace=0.24)
+        _allan(figure.add_subplot(grid[0, 0]), drawn)
+        _spectrum(figure.add_subplot(grid[0, 1]), drawn)
+        _temperature(figure.add_subplot(grid[0, 2]), drawn)
+        _gain(figure.add_subplot(grid[1, 0]), drawn)
+        _delay(figure.add_subplot(grid[1, 1]), drawn)
+        _step(figure.add_subplot(grid[1, 2]), drawn)
+        with whole_or_not(path) as draft:
+            figure.savefig(draft, format="png")
+    return path
+
+
+def _headings(figure: Figure, drawn: _Drawn) -> None:
+    name = drawn.sheet.name.replace("+-", "±")
+    figure.text(0.012, 0.985, f"{name}, as modelled", va="top", fontsize=13, fontweight="bold")
+    lines = f"{drawn.sheet.heading}   ·   measured on the FMU   ·   {drawn.sheet.summary}"
+    figure.text(0.012, 0.949, lines, va="top", fontsize=9.5)
+    legend = "of the datasheet   (hollow, dotted: unsure, not from the part's own sheet)"
+    figure.text(0.0155, 0.925, "◆", va="top", fontsize=9.5, color=_SHEET)
+    figure.text(0.0275, 0.925, legend, va="top", fontsize=9.5)
+
+
+def _is_unsure(confidence: str) -> bool:
+    return confidence in UNSURE
+
+
+def _marker(axes: Axes, x: float, y: float, confidence: str, label: str = "") -> None:
+    fill = "white" if _is_unsure(confidence) else _SHEET
+    axes.plot([x], [y], "D", ms=6, mew=1.4, color=_SHEET, mfc=fill, zorder=6, ls="none", label=label or None)
+
+
+def _line(axes: Axes, y: float, confidence: str) -> None:
+    axes.axhline(y, color=_SHEET, lw=1.1, ls=":" if _is_unsure(confidence) else "--", zorder=5)
+
+
+# --- noise -----------------------------------------------------------------------------------------------------------
+
+
+def _allan(axes: Axes, drawn: _Drawn) -> None:
+    found = drawn.found
+    name, size = UNITS[drawn.part].floor
+    axes.set_title(f"Allan deviation, {_duration(found.at_rest.duration)} at rest ({name})")
+    parts = found.at_rest.allan()
+    for (axis, colour), one in zip(_AXES.items(), parts, strict=True):
+        axes.loglog(one.tau, one.deviation / size, color=colour, label=axis, lw=0.8)
+    together = pooled(parts)
+    axes.fill_between(together.tau, together.low / size, together.high / size, color=_REST, alpha=0.55, lw=0, zorder=1)
+    tau = together.tau
+    axes.loglog(tau, _theory(tau, drawn) / size, color=_THEORY, lw=1.1, ls=(0, (4, 2)), label="theory", zorder=4)
+    density, floor = drawn.datum("noise_density"), drawn.datum("bias_instability")
+    if density is not None:
+        y = density.si / math.sqrt(2.0) / size
+        _marker(axes, 1.0, y, density.confidence)
+        text = f"D/√2 at 1 s,\nD = {density.value:g} {_plain(density.unit)}"
+        _note(axes, 1.0, y, text, (8, 8))
+    if floor is not None:
+        y = floor.si * FLICKER_FLOOR / size
+        _line(axes, y, floor.confidence)
+        axes.text(0.02, y, f"{shown(round(y, 2))} {name}", transform=axes.get_yaxis_transform(), **_over())
+    _plain_ticks(axes)
+    axes.set_xlabel("cluster time (s)", labelpad=1)
+    axes.legend(loc="upper right", ncols=2, handlelength=1.6, columnspacing=1.0)
+
+
+def _theory(tau: Array, drawn: _Drawn) -> Array:
+    """All terms together, at cluster times above what the filter correlates."""
+    instability = modelled_instability(
+        tau,
+        drawn.modelled("bias_instability"),
+        bias_instability.TIME_CONSTANTS,
+        bias_instability.SIGMA_PER_INSTABILITY,
+    )
+    total = combined(
+        white_noise(tau, drawn.modelled("noise_density")),
+        instability,
+        rate_random_walk(tau, drawn.modelled("rate_random_walk")),
+        rounding(tau, drawn.modelled("resolution"), 1.0 / drawn.found.at_rest.rate),
+    )
+    return np.where(tau < 3.0 * drawn.found.claim.delay, np.nan, total)
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds / 3600.0:.3g} h" if seconds >= 3600.0 else f"{seconds:.3g} s"
+
+
+def _plain(unit: str) -> str:
+    return unit.replace("rtHz", "√Hz").replace("deg", "°").replace("ug", "µg")
+
+
+def _over() -> dict[str, Any]:
+    return {"va": "bottom", "fontsize": 8, "color": _SHEET}
+
+
+def _plain_ticks(axes: Axes, *, with_x: bool = True) -> None:
+    """1, 2 and 5 of each decade, in plain numbers, where there are few decades."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
+
+    low, high = axes.get_ylim()
+    is_wide = math.log10(high / low) > 2.5
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0,) if is_wide else (1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    if not is_wide:
+        axes.yaxis.set_minor_locator(NullLocator())
+    if with_x:
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def _note(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float]) -> None:
+    axes.annotate(text, (x, y), offset, textcoords="offset points", fontsize=8, color=_SHEET, va="bottom")
+
+
+def _spectrum(axes: Axes, drawn: _Drawn) -> None:
+    found = drawn.found
+    name, size = UNITS[drawn.part].density
+    axes.set_title(f"Noise spectrum ({name})")
+    frequency, density = _joined_spectrum(found.at_rest.readings, found.at_rest.rate)
+    axes.loglog(frequency, density / size, color=_MODEL, lw=0.9, label="modelled, mean of x, y, z")
+    # the filter's frequencies go with the piece's clock
+    filtered, power = found.clock * found.folded[0], found.folded[1]
+    inside = filtered < 0.5 * found.at_rest.rate
+    below = np.geomspace(frequency[0], filtered[0], 40)
+    at = np.concatenate((below, filtered[inside]))
+    gain = np.concatenate((np.ones(len(below)), np.sqrt(power[inside])))
+    axes.loglog(
+        at,
+        _spectral_theory(at, drawn) * gain / size,
+        color=_THEORY,
+        lw=1.1,
+        ls=(0, (4, 2)),
+        label="theory, through the filter",
+    )
+    datum = drawn.datum("noise_density")
+    if datum is not None:
+        y = datum.si / size
+        _line(axes, y, datum.confidence)
+        text = f"{datum.value:g} {_plain(datum.unit)}"
+        axes.text(0.98, y, text, transform=axes.get_yaxis_transform(), ha="right", **_over())
+    axes.set_ylim(bottom=0.03 * float(np.median(density)) / size)
+    _plain_ticks(axes)
+    axes.set_xlabel("frequency (Hz)", labelpad=1)
+    axes.legend(loc="lower left")
+
+
+def _joined_spectrum(readings: Array, rate: float) -> tuple[Array, Array]:
+    """Amplitude density of the axes' mean power, each decade from segments as long as it wants."""
+    pieces: list[tuple[Array, Array]] = []
+    top = 0.0
+    for segments in (s for s in _SEGMENTS if len(readings) >= 40 * (s + 1)):
+        spectra = [power_spectrum(readings[:, axis], rate, segments) for axis in range(3)]
+        frequency, power = spectra[0].frequency, np.mean([one.density for one in spectra], axis=0)
+        # the lowest lines hold what the window makes of the mean
+        kept = frequency > max(top, 2.5 * frequency[1])
+        last = 25.0 * frequency[1] if segments != _SEGMENTS[-1] else math.inf
+        pieces.append((frequency[kept & (frequency <= last)], power[kept & (frequency <= last)]))
+        top = last
+    if math.isfinite(top):
+        pieces.append((frequency[frequency > top], power[frequency > top]))
+    # the last line, at half the rate, has no twin
+    pieces[-1] = (pieces[-1][0][:-1], pieces[-1][1][:-1])
+    joined = [np.concatenate([piece[i] for piece in pieces]) for i in (0, 1)]
+    return joined[0], np.sqrt(joined[1])
+
+
+def _spectral_theory(frequency: Array, drawn: _Drawn) -> Array:
+    """sqrt(D^2 + sum 4 sigma^2 T/(1 + (2 pi f T)^2) + 2 K^2/(2 pi f)^2 + q^2 T/6): one-sided, before the filter."""
+    sigma = drawn.modelled("bias_instability") * bias_instability.SIGMA_PER_INSTABILITY
+    turn = 2.0 * np.pi * frequency
+    total = np.full(len(frequency), drawn.modelled("noise_density") ** 2)
+    for constant in bias_instability.TIME_CONSTANTS:
+        total += 4.0 * sigma**2 * constant / (1.0 + (turn * constant) ** 2)
+    total += 2.0 * drawn.modelled("rate_random_walk") ** 2 / turn**2
+    total += drawn.modelled("resolution") ** 2 / (6.0 * drawn.found.at_rest.rate)
+    return np.asarray(np.sqrt(total))
+
+
+# --- temperature -----------------------------------------------------------------------------------------------------
+
+
+def _temperature(axes: Axes, drawn: _Drawn) -> None:
+    drift, (name, size) = drawn.found.drift, UNITS[drawn.part].reading
+    axes.set_title(f"Offset by temperature, from that at 25 °C ({name})")
+    up = drift.warming
+    at_25 = drift.offset[int(np.argmin(np.abs(drift.temperature[up] - 25.0)))]
+    away = (drift.offset - at_25) / size
+    tolerance = drawn.sheet.origins.get(f"{drawn.part}.bias_temperature_slope[1]")
+    if isinstance(tolerance, Tolerance):
+        _cone(axes, tolerance, drift.temperature[up], size)
+    for number, (axis, colour) in enumerate(_AXES.items()):
+        axes.plot(drift.temperature[up], away[up, number], color=colour, label=axis, lw=1.3)
+        down = slice(up.stop, None)
+        axes.plot(drift.temperature[down], away[down, number], color=colour, lw=1.3, ls=(0, (3, 2)))
+    axes.set_xlim(float(drift.temperature.min()), float(drift.temperature.max()))
+    axes.set_xlabel("ambient temperature (°C), falling dashed", labelpad=1)
+    axes.legend(loc="upper center", ncols=4, handlelength=1.2, columnspacing=1.0)
+
+
+def _cone(axes: Axes, tolerance: Tolerance, temperature: Array, size: float) -> None:
+    low, high = (bound / size * (temperature - 25.0) for bound in bounds(tolerance))
+    unsure = _is_unsure(tolerance.confidence)
+    what = "3 sigma" if tolerance.reading == "sigma" and not math.isfinite(tolerance.limit) else "limits"
+    label = f"sheet, {what}"
+    axes.fill_between(temperature, low, high, color=_SHEET, alpha=0.1, lw=0, zorder=0, label=label)
+    for edge in (low, high):
+        axes.plot(temperature, edge, color=_SHEET, lw=0.9, ls=":" if unsure else "--")
+
+
+# --- responses -------------------------------------------------------------------------------------------------------
+
+
+def _gain(axes: Axes, drawn: _Drawn) -> None:
+    found = drawn.found
+    axes.set_title("Frequency response: gain (dB)")
+    axes.axhline(HALF_POWER, color=_THEORY, lw=0.6)
+    for one in found.settings:
+        axes.semilogx(one.response.frequency, one.response.decibels, color=_REST, lw=0.9)
+    response = found.response
+    axes.semilogx(response.frequency, response.decibels, color=_MODEL, lw=1.6, label="modelled, as set")
+    if found.settings:
+        axes.plot([], [], color=_REST, lw=0.9, label="every other setting")
+    for claim in [one.claim for one in found.settings] or [found.claim]:
+        if math.isfinite(claim.frequency):
+            _marker(axes, claim.frequency, claim.decibels, claim.confidence)
+    frequency = response.frequency_of(found.claim.decibels)
+    text = f"{found.claim.decibels:.2f} dB at {shown(frequency)} Hz\nsheet: {shown(found.claim.frequency)} Hz"
+    box: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
+    text = text.replace("-", _MINUS)
+    axes.text(0.03, 0.30, text, transform=axes.transAxes, fontsize=8.5, va="bottom", bbox=box, zorder=7)
+    axes.set_ylim(-12.0, 1.0)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_xlabel("frequency (Hz)", labelpad=1)
+    axes.legend(loc="lower left")
+
+
+def _delay(axes: Axes, drawn: _Drawn) -> None:
+    if drawn.found.settings:
+        _delay_by_setting(axes, drawn)
+    else:
+        _delay_by_frequency(axes, drawn.found.response, drawn)
+
+
+def _delay_by_setting(axes: Axes, drawn: _Drawn) -> None:
+    settings = drawn.found.settings
+    is_rate = settings[0].setting.label.endswith("Hz")
+    axes.set_title("Delay by output data rate (ms)" if is_rate else "Delay by taps (ms)")
+    places = np.arange(len(settings))
+    modelled = np.array([1e3 * one.response.delay for one in settings])
+    axes.semilogy(places, modelled, "o-", color=_MODEL, ms=4.5, lw=0.9, label="modelled")
+    for place, one in zip(places, settings, strict=True):
+        claimed = 1e3 * one.claim.delay
+        _marker(axes, float(place), claimed, one.claim.confidence)
+        away = 100.0 * (modelled[place] / claimed - 1.0)
+        _percent(axes, float(place), max(claimed, modelled[place]), away)
+    labels = [one.setting.label.removesuffix(".Hz") for one in settings]
+    axes.set_xticks(places, [label.rstrip("0").rstrip(".") if "." in label else label for label in labels], rotation=35)
+    axes.tick_params(axis="x", labelsize=8, pad=1)
+    axes.set_xlim(-0.6, len(settings) - 0.4)
+    axes.set_ylim(top=3.0 * float(np.max(modelled)))
+    _plain_ticks(axes, with_x=False)
+    axes.set_xlabel("samples a second" if is_rate else "taps", labelpad=1)
+    axes.legend(loc="upper left")
+
+
+def _percent(axes: Axes, x: float, y: float, away: float) -> None:
+    text = "0.0%" if abs(away) < 0.05 else f"{away:+.1f}%".replace("-", _MINUS)
+    axes.annotate(text, (x, y), (0, 8), textcoords="offset points", fontsize=7.5, ha="center")
+
+
+def _delay_by_frequency(axes: Axes, response: Response, drawn: _Drawn) -> None:
+    claim = drawn.found.claim
+    axes.set_title("Frequency response: delay (ms)")
+    passed = response.decibels > -12.0
+    axes.plot(response.frequency[passed], 1e3 * response.delays[passed], color=_MODEL, lw=1.6, label="modelled")
+    _line(axes, 1e3 * claim.delay, claim.confidence)
+    low, high = claim.delay_limits or (0.9 * claim.delay, 1.1 * claim.delay)
+    if claim.delay_limits is not None:
+        axes.axhspan(1e3 * low, 1e3 * high, color=_SHEET, alpha=0.1, lw=0, label="sheet, limits")
+    margin = 0.35 * (high - low)
+    spread = 1e3 * response.delays[passed]
+    axes.set_ylim(
+        min(1e3 * (low - margin), 0.98 * float(spread.min())), max(1e3 * (high + margin), 1.02 * float(spread.max()))
+    )
+    text = f"{1e3 * response.delay:.3f} ms\nsheet: {1e3 * claim.delay:.3g} ms"
+    axes.text(0.03, 0.06, text, transform=axes.transAxes, fontsize=8.5, va="bottom")
+    axes.set_xlim(left=0.0)
+    axes.set_xlabel("frequency (Hz)", labelpad=1)
+    axes.legend(loc="upper right")
+
+
+def _step(axes: Axes, drawn: _Drawn) -> None:
+    step, claim = drawn.found.step, drawn.found.claim
+    word = 1e3 * word_period(drawn.sensor, drawn.part)
+    axes.set_title("Step response")
+    axes.plot(1e3 * step.time, step.share, ".-", color=_MODEL, ms=4, lw=0.8, label="modelled, first shown by a word")
+    _marker(axes, 1e3 * claim.delay, 0.5, claim.confidence)
+    _note(axes, 1e3 * claim.delay, 0.5, f"delay {1e3 * claim.delay:.4g} ms", (8, -10))
+    axes.text(0.97, 0.30, f"a word every {word:.4g} ms", transform=axes.transAxes, fontsize=8.5, ha="right")
+    settled = 1e3 * float(step.time[np.flatnonzero(step.share > 0.999)[0]])
+    axes.set_xlim(0.0, max(1.25 * settled, 2.2e3 * claim.delay))
+    axes.set_ylim(-0.08, 1.12)
+    axes.set_xlabel("time since the step (ms)", labelpad=1)
+    axes.legend(loc="upper left")

@@ -1,0 +1,295 @@
+"""Faults of single channels, the status that the parts raise, the words that carry both, and the self-test."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from faultless_parts import ADIS, GYRO, STILL, faultless, run_of
+
+from attitude_fmu.models.attitude_sensor import MODEL, Parameters
+from attitude_fmu.models.sensors import adis16354_words, adxl355_registers, adxrs450_frame
+from attitude_fmu.models.sensors.faults import CHANNEL, FAULT, FaultParameters, faulted
+from attitude_fmu.models.system import Run
+
+BOTH = pytest.mark.parametrize("device", [GYRO, ADIS])
+CHANNELS = pytest.mark.parametrize("channel", range(6), ids=[item.name for item in CHANNEL.items])
+START, END, STOP = 0.05, 0.1, 0.2
+MOVING = STILL._replace(rate=(0.5, -0.6, 0.7), specific_force=(3.0, 4.0, -5.0))
+OTHER = STILL._replace(rate=(-0.1, 0.2, 0.3), specific_force=(-1.0, 2.0, 1.5))
+
+
+def one_fault(kind: str, channel: int, size: float = 0.1, start: float = START, end: float = END) -> FaultParameters:
+    return FaultParameters(FAULT.value(kind), channel + 1, start, end, size)
+
+
+def with_fault(device: str, kind: str, channel: int, **changes: Any) -> Parameters:
+    p = faultless(device)
+    return p._replace(fault=(FaultParameters(), one_fault(kind, channel, **changes)))
+
+
+def codes(run: Run) -> tuple[float, ...]:
+    register = run.outputs().register
+    return *register.rate, *register.acceleration
+
+
+def readings(run: Run) -> tuple[float, ...]:
+    return *run.state.reading.rate, *run.state.reading.specific_force
+
+
+def full_scale(run: Run, channel: int) -> float:
+    part = run.parameters.gyro if channel < 3 else run.parameters.accelerometer
+    return part.range / part.resolution
+
+
+def at(run: Run, inputs: Any, time: float) -> tuple[float, ...]:
+    run.advance(inputs, time)
+    return codes(run)
+
+
+@CHANNELS
+@BOTH
+def test_a_stuck_channel_keeps_its_last_word_and_recovers(device: str, channel: int) -> None:
+    run = Run(MODEL, with_fault(device, "stuck", channel), MOVING)
+    well = at(run, MOVING, START - 0.001)
+    during = at(run, OTHER, END - 0.005)
+    assert during[channel] == well[channel]
+    assert all(during[i] != well[i] for i in range(6) if i != channel)
+    assert at(run, OTHER, STOP) == codes(run_of(faultless(device), OTHER, STOP))
+
+
+@CHANNELS
+@BOTH
+def test_a_dropped_channel_delivers_zero(device: str, channel: int) -> None:
+    run = Run(MODEL, with_fault(device, "dropped", channel), MOVING)
+    well = at(run, MOVING, START - 0.005)
+    during = at(run, MOVING, END - 0.005)
+    assert during == tuple(0.0 if i == channel else code for i, code in enumerate(well))
+    assert at(run, MOVING, STOP) == well
+
+
+@CHANNELS
+@BOTH
+def test_a_saturated_channel_lies_at_the_end_of_its_range_and_says_so(device: str, channel: int) -> None:
+    for size, sign in ((0.1, 1.0), (-0.1, -1.0)):
+        run = Run(MODEL, with_fault(device, "saturated", channel, size=size), MOVING)
+        well = at(run, MOVING, START - 0.005)
+        assert run.outputs().status == 1  # aligning
+        during = at(run, MOVING, END - 0.005)
+        assert during[channel] == pytest.approx(sign * full_scale(run, channel), abs=1.0)
+        assert [*during[:channel], *during[channel + 1 :]] == [*well[:channel], *well[channel + 1 :]]
+        beyond = run.state.gyro[channel].over_range if channel < 3 else run.state.accelerometer.over_range
+        assert beyond == 1.0
+        assert at(run, MOVING, STOP) == well
+
+
+@CHANNELS
+@BOTH
+def test_a_drifting_channel_runs_away_by_its_size_each_second(device: str, channel: int) -> None:
+    run = Run(MODEL, with_fault(device, "drifting", channel, size=2.0), STILL)
+    assert at(run, STILL, START - 0.005) == (0.0,) * 6
+    # words a known time apart: the drift between them is exact but for rounding
+    seen, words = [], []
+    for time in (START + 0.01, END - 0.005):
+        seen.append(at(run, STILL, time)[channel])
+        state = run.state.gyro[channel] if channel < 3 else run.state.accelerometer
+        words.append(state.words)
+    k = run.coefficients.gyro.word_period[channel] if channel < 3 else run.coefficients.accelerometer.word_period
+    per_second = (seen[1] - seen[0]) / ((words[1] - words[0]) * k)
+    assert per_second == pytest.approx(2.0 * full_scale(run, channel), rel=1e-3, abs=1.0 / k / (words[1] - words[0]))
+    late = 2 * k  # words still under way when the fault begins
+    assert seen[1] == pytest.approx(2.0 * full_scale(run, channel) * (END - 0.005 - START), abs=late * per_second)
+    assert at(run, STILL, STOP) == (0.0,) * 6
+
+
+@CHANNELS
+@BOTH
+def test_one_word_in_a_hundred_is_a_spike_of_the_size(device: str, channel: int) -> None:
+    run = Run(MODEL, with_fault(device, "spiking", channel, start=0.0, end=10.0), STILL)
+    found: dict[float, int] = {}
+    last = -1.0
+    while run.state.reading.readings < 750:
+        run.advance(STILL, (run.state.reading.readings + 1) * 0.002)
+        state = run.state.gyro[channel] if channel < 3 else run.state.accelerometer
+        if state.words != last:
+            last = state.words
+            found[codes(run)[channel]] = found.get(codes(run)[channel], 0) + 1
+    size = math.floor(0.1 * full_scale(run, channel) + 0.5)
+    assert set(found) <= {0.0, size, -size}
+    spikes = sum(found.values()) - found[0.0]
+    # of 750 words 7.5 are expected, Poisson: 1 to 18 but once in 800
+    assert 1 <= spikes <= 18
+
+
+def test_spikes_come_once_in_a_hundred_and_both_ways() -> None:
+    spike = FaultParameters(FAULT.value("spiking"), 1, 0.0, 1e9, 0.1)
+    values = [faulted(0.0, 5.0, spike, 0, 1.0, draw).value for draw in (-2.6, -2.55, 0.0, 2.55, 2.6)]
+    assert values == [-0.5, 0.0, 0.0, 0.0, 0.5]
+    assert math.erfc(2.5758293035489004 / math.sqrt(2.0)) == pytest.approx(0.01, rel=1e-12)
+
+
+@CHANNELS
+@BOTH
+def test_lost_frames_hold_the_last_reading_while_the_part_goes_on(device: str, channel: int) -> None:
+    run = Run(MODEL, with_fault(device, "lost_frames", channel), MOVING)
+    run.advance(MOVING, START - 0.001)
+    well = readings(run)
+    run.advance(OTHER, END - 0.005)
+    during = readings(run)
+    assert during[channel] == well[channel]
+    assert all(during[i] != well[i] for i in range(6) if i != channel)
+    assert codes(run) == codes(run_of(faultless(device), OTHER, STOP))
+    run.advance(OTHER, STOP)
+    assert readings(run) == readings(run_of(faultless(device), OTHER, STOP))
+
+
+def test_two_faults_at_once() -> None:
+    p = faultless()._replace(fault=(one_fault("dropped", 0), one_fault("saturated", 4)))
+    run = Run(MODEL, p, MOVING)
+    during = at(run, MOVING, END - 0.005)
+    assert during[0] == 0.0
+    assert during[4] == pytest.approx(full_scale(run, 4), abs=1.0)
+    both = faultless()._replace(fault=(one_fault("drifting", 1, size=1.0), one_fault("stuck", 1, start=0.08)))
+    run = Run(MODEL, both, STILL)
+    assert 0.0 < at(run, STILL, 0.079)[1] <= at(run, STILL, 0.082)[1] == at(run, STILL, END - 0.005)[1]
+
+
+def test_faults_can_be_switched_while_running() -> None:
+    p = faultless()
+    run = run_of(p, MOVING, 0.05)
+    assert codes(run)[2] != 0.0
+    run.tune(p._replace(fault=(one_fault("dropped", 2, start=0.0, end=1e9), FaultParameters())))
+    assert at(run, MOVING, 0.1)[2] == 0.0
+    run.tune(p)
+    assert at(run, MOVING, 0.15)[2] != 0.0
+
+
+# --- status and words ------------------------------------------------------------------------------------------------
+
+
+def unsigned(word: float) -> int:
+    assert -(2**31) <= word < 2**31
+    assert word == int(word)
+    return int(word) & 0xFFFFFFFF
+
+
+@pytest.mark.parametrize("channel", range(3))
+def test_an_adxrs450_marks_what_is_wrong_with_it_in_its_own_frame_alone(channel: int) -> None:
+    for kind, status, named in (
+        ("none", adxrs450_frame.VALID, set()),
+        ("dropped", adxrs450_frame.INVALID, {"phase_lock", "self_test"}),
+        ("stuck", adxrs450_frame.VALID, {"self_test"}),
+        ("spiking", adxrs450_frame.VALID, set()),
+        ("lost_frames", adxrs450_frame.VALID, set()),
+    ):
+        run = run_of(with_fault(GYRO, kind, channel), MOVING, END - 0.005)
+        register = run.outputs().register
+        for axis in range(3):
+            frame = adxrs450_frame.decode_sensor_data(unsigned(register.gyro_word[axis]))
+            assert frame.parity_holds
+            assert frame.code == register.rate[axis]
+            mine = axis == channel
+            assert frame.status == (status if mine else adxrs450_frame.VALID), kind
+            assert {name for name, bit in frame.faults._asdict().items() if bit} == (named if mine else set()), kind
+        assert register.status_word == 0.0
+
+
+def test_frames_are_numbered_by_the_readings() -> None:
+    run = Run(MODEL, faultless(), STILL)
+    seen = []
+    for reading in range(1, 18):
+        run.advance(STILL, reading * 0.002)
+        word = unsigned(run.outputs().register.gyro_word[0])
+        seen.append(adxrs450_frame.decode_sensor_data(word).sequence)
+    assert seen == [reading % 8 for reading in range(1, 18)]
+
+
+def test_every_frame_of_a_noisy_run_has_odd_parity_and_the_registers_code() -> None:
+    run = Run(MODEL, MODEL.Parameters(), MOVING)
+    for step in range(1, 200):
+        run.advance(MOVING, step * 0.0023)
+        register = run.outputs().register
+        for axis in range(3):
+            frame = adxrs450_frame.decode_sensor_data(unsigned(register.gyro_word[axis]))
+            assert (frame.parity_holds, frame.code) == (True, register.rate[axis])
+            word = register.accelerometer_word[axis]
+            assert 0 <= word < 2**24
+            assert adxl355_registers.code_of_data(word) == register.acceleration[axis]
+            assert word == adxl355_registers.data_word(register.acceleration[axis])
+
+
+@CHANNELS
+def test_an_adis16354_reports_a_failed_channel_in_status_and_alarms_in_every_word(channel: int) -> None:
+    bit = {0: 10, 1: 11, 2: 12, 3: 13, 4: 14, 5: 15}[channel]  # X, Y, Z gyro, X, Y, Z accelerometer
+    for kind in ("stuck", "dropped"):
+        run = Run(MODEL, with_fault(ADIS, kind, channel), MOVING)
+        run.advance(MOVING, START - 0.01)
+        assert run.outputs().register.status_word == 0.0
+        assert not any(int(word) & 0x4000 for word in run.outputs().register.gyro_word)
+        run.advance(MOVING, END - 0.005)
+        assert run.outputs().register.status_word == 2**bit + 2**5
+        register = run.outputs().register
+        assert all(int(word) & 0x4000 for word in (*register.gyro_word, *register.accelerometer_word))
+        run.advance(MOVING, STOP)
+        assert run.outputs().register.status_word == 0.0
+
+
+def test_an_adis16354_reports_range_and_supply() -> None:
+    far = MOVING._replace(rate=(0.0, 6.0, 0.0))
+    assert run_of(faultless(ADIS), far, 0.05).outputs().register.status_word == 2**4
+    for volts, word in ((4.7, 1), (4.75, 0), (5.25, 0), (5.3, 2)):
+        run = run_of(faultless(ADIS), MOVING._replace(supply_voltage=volts), 0.05)
+        assert run.outputs().register.status_word == word
+
+
+def test_output_words_of_an_adis16354_carry_code_and_new_data() -> None:
+    run = Run(MODEL, faultless(ADIS, processor__period=0.004), MOVING)
+    new = []
+    for step in range(1, 41):
+        run.advance(MOVING, step * 0.001)
+        register, reading = run.outputs().register, run.state.reading
+        for code, word in zip(
+            (*register.rate, *register.acceleration),
+            (*register.gyro_word, *register.accelerometer_word),
+            strict=True,
+        ):
+            assert 0 <= word < 2**16
+            assert adis16354_words.code_of_output(word) == code
+        fresh = run.state.gyro[0].words > reading.gyro_words[0]
+        assert int(register.gyro_word[0]) >> 15 == fresh
+        new.append(fresh)
+    assert set(new) == {True, False}
+
+
+# --- self-test -------------------------------------------------------------------------------------------------------
+
+
+@BOTH
+def test_the_self_test_adds_its_response(device: str) -> None:
+    p = faultless(device, gyro__self_test_response=(0.1, 0.2, -0.3))
+    run = run_of(p, MOVING, 0.05)
+    before = codes(run)
+    run.tune(p._replace(gyro=p.gyro._replace(self_test=True), accelerometer=p.accelerometer._replace(self_test=True)))
+    during = at(run, MOVING, 0.1)
+    responses = (*p.gyro.self_test_response, *p.accelerometer.self_test_response)
+    for i in range(6):
+        lsb = p.gyro.resolution if i < 3 else p.accelerometer.resolution
+        assert (during[i] - before[i]) * lsb == pytest.approx(responses[i], abs=lsb)
+    run.tune(p)
+    assert at(run, MOVING, 0.15) == before
+
+
+def test_the_adxl355_answers_its_self_test_as_the_sheet_says() -> None:
+    assert faultless().accelerometer.self_test_response == pytest.approx((0.3 * 9.80665, 0.3 * 9.80665, 1.5 * 9.80665))
+
+
+def test_a_checked_adxrs450_raises_every_fault_in_self_test_data() -> None:
+    run = run_of(faultless(gyro__self_test=True), MOVING, 0.05)
+    for word in run.outputs().register.gyro_word:
+        frame = adxrs450_frame.decode_sensor_data(unsigned(word))
+        assert frame.status == adxrs450_frame.SELF_TEST
+        assert frame.faults == adxrs450_frame.ALL_FAULTS._replace(
+            fail=0.0, amplitude=0.0, over_voltage=0.0, under_voltage=0.0
+        )
+        assert frame.parity_holds

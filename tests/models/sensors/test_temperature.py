@@ -1,0 +1,170 @@
+"""Thermometers, the thermostat around the sensor, and the processor's compensation."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from faultless_parts import ADIS, GYRO, STILL, faultless, only_slow, run_of
+
+from attitude_fmu.models.attitude_sensor import MODEL
+from attitude_fmu.models.sensors import adis16354_words, adxl355_registers, adxrs450_frame, thermal
+from attitude_fmu.models.system import Run
+
+
+def at_celsius(temperature: float) -> Any:
+    return STILL._replace(temperature=temperature + 273.15)
+
+
+@pytest.mark.parametrize(("temperature", "code"), [(0.0, -225.0), (25.0, -100.0), (45.0, 0.0), (85.0, 200.0)])
+def test_the_adxrs450_shows_the_sheets_temperature_codes(temperature: float, code: float) -> None:
+    run = run_of(faultless(), at_celsius(temperature), 0.0)
+    assert run.outputs().register.gyro_temperature == code
+    word = adxrs450_frame.temperature_word(temperature + 273.15)
+    assert word == (int(code) & 0x3FF) << 6
+
+
+@pytest.mark.parametrize("temperature", [-40.0, 0.0, 25.0, 61.7, 85.0])
+def test_thermometers_agree_with_the_registers_of_their_parts(temperature: float) -> None:
+    kelvin = temperature + 273.15
+    shown = run_of(faultless(), at_celsius(temperature), 0.0).outputs().register
+    assert shown.accelerometer_temperature == adxl355_registers.temperature_code(kelvin)
+    shown = run_of(faultless(ADIS), at_celsius(temperature), 0.0).outputs().register
+    assert shown.gyro_temperature == adis16354_words.temperature_code(kelvin)
+    assert shown.accelerometer_temperature == shown.gyro_temperature
+
+
+def test_a_thermometers_error_shifts_its_code_and_self_heating_too() -> None:
+    p = faultless(gyro__thermometer__error=2.0, gyro__thermal__self_heating=4.0)
+    assert run_of(p, at_celsius(25.0), 0.0).outputs().register.gyro_temperature == -100.0 + 5.0 * 6.0
+    assert run_of(p, at_celsius(25.0), 0.0).outputs().die_temperature.gyro == pytest.approx(302.15)
+
+
+def test_a_reading_is_the_temperature_to_half_a_step() -> None:
+    for p in (faultless(), faultless(ADIS)):
+        for meter in (p.gyro.thermometer, p.accelerometer.thermometer):
+            for kelvin in np.linspace(233.0, 378.0, 50):
+                read = thermal.thermometer_reading(meter, thermal.thermometer_code(meter, kelvin))
+                assert abs(read - kelvin) <= 0.5 / abs(meter.sensitivity) + 1e-9
+    blind = thermal.ThermometerParameters(0.0, 7.0)
+    assert thermal.thermometer_reading(blind, thermal.thermometer_code(blind, 350.0)) == 298.15
+
+
+# --- thermostat ------------------------------------------------------------------------------------------------------
+
+
+def heated(ambient: float, until: float, run: Run | None = None, **heater: float) -> Run:
+    """The enclosure at this ambient temperature in degC until then."""
+    if run is None:
+        values = {f"heater__{name}": value for name, value in heater.items()}
+        run = Run(MODEL, only_slow(heater__enabled=True, **values), at_celsius(ambient))
+    run.advance(at_celsius(ambient), until)
+    return run
+
+
+def enclosure(run: Run) -> float:
+    """degC"""
+    return run.state.slow.heater.temperature - 273.15
+
+
+@pytest.mark.parametrize("ambient", [5.0, 20.0, 40.0])
+def test_the_thermostat_holds_its_setpoint(ambient: float) -> None:
+    run = heated(ambient, 600.0)
+    assert enclosure(run) == pytest.approx(45.0, abs=0.05)
+    power = (45.0 - ambient) / run.parameters.heater.largest_rise
+    assert run.state.slow.heater.integral == pytest.approx(power, abs=2e-3)
+    assert run.outputs().die_temperature.gyro == pytest.approx(318.15, abs=0.1)
+
+
+def test_the_thermostat_cannot_do_more_than_full_power_nor_cool() -> None:
+    run = heated(-20.0, 120.0)
+    assert enclosure(run) == pytest.approx(-20.0 + 45.0 * (1 - math.exp(-1.0)))  # a first-order enclosure, full power
+    assert enclosure(heated(-20.0, 1500.0, run)) == pytest.approx(25.0, abs=1e-3)
+    assert enclosure(heated(60.0, 600.0)) == pytest.approx(60.0)
+
+
+def test_the_thermostats_integral_does_not_wind_up() -> None:
+    cold = heated(-20.0, 1500.0)  # full power for 25 minutes
+    assert 0.0 <= cold.state.slow.heater.integral <= 1.0
+    hottest, inside = -math.inf, 0.0
+    for time in range(1510, 2400, 10):
+        hottest = max(hottest, enclosure(heated(20.0, float(time), cold)))
+    inside = enclosure(cold)
+    assert hottest < 45.0 + 1.5
+    assert inside == pytest.approx(45.0, abs=0.05)
+
+
+def test_without_heater_the_sensor_lies_at_ambient_temperature() -> None:
+    run = run_of(only_slow(), at_celsius(30.0), 1.0)
+    assert enclosure(run) == pytest.approx(30.0)
+    assert run.state.slow.heater.integral == 0.0
+
+
+def test_a_thermostat_takes_most_of_a_days_temperature_out_of_the_bias() -> None:
+    slope = {"gyro__bias_temperature_slope": (1e-4, 0.0, 0.0)}
+    offsets = {}
+    for enabled in (False, True):
+        run = Run(MODEL, only_slow(heater__enabled=enabled, **slope), at_celsius(20.0))
+        run.advance(at_celsius(20.0), 900.0)
+        offsets[enabled] = []
+        for minute in range(60):
+            run.advance(at_celsius(20.0 + 8.0 * math.sin(0.1 * minute)), 900.0 + 60.0 * (minute + 1))
+            offsets[enabled].append(run.state.slow.gyro_offset[0])
+    assert np.ptp(offsets[True]) < 0.05 * np.ptp(offsets[False])
+
+
+# --- compensation ----------------------------------------------------------------------------------------------------
+
+ERRORS: dict[str, Any] = {
+    "bias": (0.01, -0.02, 0.03),
+    "bias_temperature_slope": (1e-4, 2e-4, -3e-4),
+    "bias_temperature_curve": (1e-6, -2e-6, 4e-6),
+}
+MATRIX = ((1.01, 0.02, -0.01), (0.0, 0.98, 0.03), (0.01, 0.0, 1.02))
+
+
+@pytest.mark.parametrize("device", [GYRO, ADIS])
+def test_compensation_takes_out_exactly_what_it_is_given(device: str) -> None:
+    # a matrix S = I + diag(scale) + cross, biases by temperature, g-sensitivity: M = S^-1, b, G
+    scale_error = tuple(MATRIX[i][i] - 1.0 for i in range(3))
+    cross = tuple(tuple(0.0 if i == j else MATRIX[i][j] for j in range(3)) for i in range(3))
+    push = ((1e-3, 2e-3, -1e-3), (0.0, 3e-3, 1e-3), (-2e-3, 0.0, 1e-3))
+    inverse = tuple(map(tuple, np.linalg.inv(np.array(MATRIX)).tolist()))
+    errors = {
+        f"{part}__{name}": value
+        for part in ("gyro", "accelerometer")
+        for name, value in {**ERRORS, "scale_error": scale_error, "cross_axis": cross}.items()
+    }
+    given = {
+        f"compensation__{part}_{name}": value
+        for part in ("gyro", "accelerometer")
+        for name, value in {**ERRORS, "matrix": inverse}.items()
+    }
+    rate, force = (0.5, -0.6, 0.7), (3.0, 4.0, -5.0)
+    moving = at_celsius(65.0)._replace(rate=rate, specific_force=force)  # a whole number of steps of two thermometers
+    fine = {"gyro__thermometer__sensitivity": 1e6, "accelerometer__thermometer__sensitivity": 1e6}
+    p = faultless(device, True, gyro__g_sensitivity=push, **errors)
+    raw = run_of(p, moving, 0.05).outputs()
+    assert max(abs(a - b) for a, b in zip(raw.rate_measured, rate, strict=True)) > 0.01
+    limits = {"gyro__thermometer__sensitivity": 1000.0, "accelerometer__thermometer__sensitivity": 1000.0}
+    assert set(limits) == set(fine)
+    compensated = faultless(
+        device, True, gyro__g_sensitivity=push, compensation__g_sensitivity=push, **errors, **given, **limits
+    )
+    shown = run_of(compensated, moving, 0.05).outputs()
+    # what is left: the thermometers' half step of 1/2000 K
+    assert shown.rate_measured == pytest.approx(rate, abs=5e-7)
+    assert shown.specific_force_measured == pytest.approx(force, abs=5e-7)
+
+
+def test_compensation_is_only_as_good_as_the_thermometer() -> None:
+    p = faultless(
+        fine=True,
+        gyro__bias_temperature_slope=(1e-3, 0.0, 0.0),
+        compensation__gyro_bias_temperature_slope=(1e-3, 0.0, 0.0),
+        gyro__thermometer__error=2.0,
+    )
+    shown = run_of(p, at_celsius(45.0), 0.05).outputs()
+    assert shown.rate_measured[0] == pytest.approx(-2e-3, abs=1e-8)
