@@ -113,9 +113,13 @@ def fine(sensor: Sensor) -> dict[str, Value]:
     return values
 
 
+_STEADY: dict[str, Value] = {"accelerometer.high_pass": "none"}
+"""The high-pass off, which would let nothing steady pass."""
+
+
 def perfect(sensor: Sensor, *, but: Iterable[str] = ()) -> Sensor:
-    """The sensor without errors `but` those named and without visible register steps: filters and delays are left."""
-    return sensor.but(quiet(sensor, but=but), fine(sensor))
+    """The sensor without errors `but` those named, high-pass and visible register steps; low-passes are left."""
+    return sensor.but(quiet(sensor, but=but), fine(sensor), _STEADY)
 
 
 def readings(sensor: Sensor, part: Part, record: Record) -> Array:
@@ -414,6 +418,7 @@ class Held(NamedTuple):
 
 def held(sensor: Sensor, names: tuple[str, ...], levels: Array) -> Held:
     """What the registers show when the inputs `names` have been held at each row of `levels` until all has settled."""
+    sensor = sensor.but(_STEADY)
     step = 2.5 * _SLOW_PERIOD
     for part in PARTS:
         step += _settling_words(sensor, part) * clockwork(sensor, part).word

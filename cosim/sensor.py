@@ -79,6 +79,8 @@ def show_sensor(request: SensorRequest) -> None:
         chosen = {**values, **_settings(interface, request.settings)}
         with _stages() as (stage, progress), benches(fmu, interface, progress) as made:
             sensor = Sensor(made, chosen)
+            if sensor.number("ideal") > 0.5:
+                raise SystemRefusedError("ideal = true: a sensor without errors, filters and clocks cannot be measured")
             found = findings(sensor, QUICK if request.quick else FULL, stage)
             told = lines(found, sources)
             stage("drawing", 0.0)

@@ -12,14 +12,14 @@ import numpy as np
 from attitude_fmu.models.sensors import bias_instability
 from attitude_fmu.models.sensors.datasheet import UNSURE, Datum, Origin, Tolerance
 
-from .allan import FLICKER_FLOOR, combined, modelled_instability, pooled, rate_random_walk, rounding, white_noise
+from .allan import combined, modelled_instability, pooled, rate_random_walk, rounding, white_noise
 from .bench import Array
 from .characteristics import Part, Response, Sensor
 from .filter_claims import HALF_POWER
 from .identification import power_spectrum
 from .plot import STYLE
 from .sensor_findings import Findings, word_period
-from .sensor_report import UNITS, bounds, shown
+from .sensor_report import UNITS, bounds, floor_of, shown
 from .workspace import whole_or_not
 
 # matplotlib is imported where a picture is made: most commands need none
@@ -131,7 +131,7 @@ def _allan(axes: Axes, drawn: _Drawn) -> None:
         text = f"D/√2 at 1 s,\nD = {density.value:g} {_plain(density.unit)}"
         _note(axes, 1.0, y, text, (8, 8))
     if floor is not None:
-        y = floor.si * FLICKER_FLOOR / size
+        y = floor_of(floor) / size
         _line(axes, y, floor.confidence)
         axes.text(0.02, y, f"{shown(round(y, 2))} {name}", transform=axes.get_yaxis_transform(), **_over())
     _plain_ticks(axes)
@@ -193,15 +193,10 @@ def _spectrum(axes: Axes, drawn: _Drawn) -> None:
     axes.set_title(f"Noise spectrum ({name})")
     frequency, density = _joined_spectrum(found.at_rest.readings, found.at_rest.rate)
     axes.loglog(frequency, density / size, color=_MODEL, lw=0.9, label="modelled, mean of x, y, z")
-    # the filter's frequencies go with the piece's clock
-    filtered, power = found.clock * found.folded[0], found.folded[1]
-    inside = filtered < 0.5 * found.at_rest.rate
-    below = np.geomspace(frequency[0], filtered[0], 40)
-    at = np.concatenate((below, filtered[inside]))
-    gain = np.concatenate((np.ones(len(below)), np.sqrt(power[inside])))
+    at = np.geomspace(frequency[0], 0.5 * found.at_rest.rate, 300)
     axes.loglog(
         at,
-        _spectral_theory(at, drawn) * gain / size,
+        _spectral_theory(at, drawn) * np.sqrt(_power_as_read(at, found)) / size,
         color=_THEORY,
         lw=1.1,
         ls=(0, (4, 2)),
@@ -217,6 +212,21 @@ def _spectrum(axes: Axes, drawn: _Drawn) -> None:
     _plain_ticks(axes)
     axes.set_xlabel("frequency (Hz)", labelpad=1)
     axes.legend(loc="lower left")
+
+
+def _power_as_read(frequency: Array, found: Findings) -> Array:
+    """sum_k P(f + k r) sinc^2((f + k r)/w): share of white noise in words of rate w that are held and read at rate r.
+
+    P repeats with w; the mean of the axes, each of which has a clock of its own.
+    """
+    rate = found.at_rest.rate
+    power = np.zeros(len(frequency))
+    for word_rate in found.word_rate:
+        for image in range(-20, 21):
+            at = np.abs(frequency + image * rate) / word_rate
+            folded = np.abs(at - np.round(at)) * rate
+            power += np.interp(folded, *found.folded) * np.sinc(at) ** 2
+    return power / 3.0
 
 
 def _joined_spectrum(readings: Array, rate: float) -> tuple[Array, Array]:

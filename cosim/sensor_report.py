@@ -14,7 +14,6 @@ from attitude_fmu.models.attitude.rotations import STANDARD_GRAVITY
 from attitude_fmu.models.sensors.adxrs450_sheet import NULL_ACCURACY
 from attitude_fmu.models.sensors.datasheet import UNSURE, Choice, Datum, Origin, Tolerance, in_si
 
-from .allan import FLICKER_FLOOR
 from .bench import Array
 from .characteristics import PARTS, Estimate, Part, Setting
 from .sensor_findings import Findings, SettingFound
@@ -123,6 +122,11 @@ def _tolerance(origins: Origins, name: str) -> Tolerance | None:
     return origin if isinstance(origin, Tolerance) else None
 
 
+def floor_of(instability: Datum) -> float:
+    """The minimum of the Allan deviation as the sheet prints it, in SI; the parameter is the coefficient B."""
+    return 0.664 * instability.si
+
+
 def _is_given(datum: Datum | None) -> bool:
     return datum is not None and not (datum.value == 0.0 and datum.confidence == "assumption")
 
@@ -206,7 +210,7 @@ def _noise(found: Findings, origins: Origins) -> list[Line]:
     density = _datum(origins, f"{part}.noise_density")
     instability = _datum(origins, f"{part}.bias_instability")
     walk = _datum(origins, f"{part}.rate_random_walk")
-    floor = instability.si * FLICKER_FLOOR if instability is not None and _is_given(instability) else None
+    floor = floor_of(instability) if instability is not None and _is_given(instability) else None
     step = walk.si if walk is not None and _is_given(walk) else None
     told = [
         _estimated(part, "noise density", units.density, found.white, density and density.si, _WHITE, density),

@@ -50,7 +50,7 @@ from .sensors.accelerometer import (
 from .sensors.board import BOARD
 from .sensors.datasheet import REFERENCE_TEMPERATURE
 from .sensors.digital_filter import TAPS, DelayLines
-from .sensors.faults import FAULT, FaultParameters, is_active
+from .sensors.faults import LOST_FRAMES, FaultParameters, is_active
 from .sensors.gyro import GYRO_FILTER, GyroCoefficients, GyroParameters, GyroState
 from .sensors.sensitivity import hysteresis_loop, hysteresis_offset, with_temperature
 from .sensors.thermal import (
@@ -100,6 +100,12 @@ STATUS = Enumeration(
     ),
     "what the sensor is doing",
 )
+
+
+_ALIGNING, _RUNNING, _OVER_RANGE = (STATUS.value(item.name) for item in STATUS.items)
+_CIC, _DECIMATOR = GYRO_FILTER.value("cic"), ACCELEROMETER_FILTER.value("decimator")
+_BARTLETT = 2
+"""How an ADIS16354 senses, whatever its taps."""
 
 
 class MountingParameters(NamedTuple):
@@ -673,7 +679,7 @@ def _lost(channel: int, p: Parameters, time: Scalar) -> Scalar:
     """1.0 where the word of a channel does not reach the processor."""
     lost: Scalar = 0.0
     for fault in p.fault:
-        gone = both(fault.kind == FAULT.value("lost_frames"), is_active(fault, channel, time))
+        gone = both(fault.kind == LOST_FRAMES, is_active(fault, channel, time))
         lost = where(gone, 1.0, lost)
     return lost
 
@@ -882,7 +888,7 @@ def _words_of_gyro(axis: int, state: State, p: Parameters, status: Scalar) -> Sc
     response = adxrs450.sensor_data_response(gyro.code, sequence, adxrs450.data_status(checking, lost), faults)
     fresh = where(gyro.words > state.reading.gyro_words[axis], 1.0, 0.0)
     word = adis16354.output_word(gyro.code, fresh, adis16354.error_or_alarm(status))
-    return where(p.gyro.filter == GYRO_FILTER.value("cic"), adxrs450.as_int32(response), word)
+    return where(p.gyro.filter == _CIC, adxrs450.as_int32(response), word)
 
 
 def _status_word(state: State, p: Parameters) -> Scalar:
@@ -907,7 +913,7 @@ def _status_word(state: State, p: Parameters) -> Scalar:
         supply_high=where(volts > 5.25, 1.0, 0.0),
         supply_low=where(volts < 4.75, 1.0, 0.0),
     )
-    return where(p.gyro.filter == GYRO_FILTER.value("cic"), 0.0, adis16354.status_word(status))
+    return where(p.gyro.filter == _CIC, 0.0, adis16354.status_word(status))
 
 
 def _registers(state: State, p: Parameters) -> RegisterOutputs:
@@ -915,7 +921,7 @@ def _registers(state: State, p: Parameters) -> RegisterOutputs:
     part = state.accelerometer
     fresh = where(part.words > state.reading.accelerometer_words, 1.0, 0.0)
     error = adis16354.error_or_alarm(status)
-    decimates = p.accelerometer.filter == ACCELEROMETER_FILTER.value("decimator")
+    decimates = p.accelerometer.filter == _DECIMATOR
     return RegisterOutputs(
         (state.gyro[0].code, state.gyro[1].code, state.gyro[2].code),
         part.code,
@@ -951,8 +957,8 @@ def outputs(state: State, p: Parameters, _k: Coefficients) -> Outputs:
         aligned=attitude.aligned > 0.5,
         status=where(
             attitude.aligned > 0.5,
-            where(beyond > 0.5, STATUS.value("over_range"), STATUS.value("running")),
-            STATUS.value("aligning"),
+            where(beyond > 0.5, _OVER_RANGE, _RUNNING),
+            _ALIGNING,
         ),
     )
 
@@ -967,7 +973,7 @@ def _gyro_range(p: Parameters) -> tuple[Scalar, Scalar]:
     """What taps and register word leave of the gyros' range."""
     taps = p.gyro.filter
     least = where(
-        taps == GYRO_FILTER.value("cic"),
+        taps == _CIC,
         0.0,
         where(
             taps >= GYRO_FILTER.value("bartlett_16"),
@@ -999,10 +1005,6 @@ def _rules() -> tuple[Rule, ...]:
     )
 
 
-_CIC, _DECIMATOR, _BARTLETT = 1, 1, 2
-"""How a part senses: as an ADXRS450, as an ADXL355, or as an ADIS16354, whatever its taps."""
-
-
 def _gyro_tasks(axis: int) -> tuple[Task, Task, Task]:
     """A gyro senses, and every few inputs updates its register: one task for a CIC, one for Bartlett filters."""
     name = f"gyro_{axis + 1}"
@@ -1013,16 +1015,15 @@ def _gyro_tasks(axis: int) -> tuple[Task, Task, Task]:
     def senses(k: Coefficients) -> Scalar:
         return k.gyro.senses
 
-    cic = GYRO_FILTER.value("cic")
     ways = {GYRO_FILTER.value(f"bartlett_{taps}"): _gyro_sample(axis, taps) for taps in TAPS}
     return (
         Task(
             f"{name}_sense",
             name,
             {_CIC: _gyro_sense(axis, gyros.sense), _BARTLETT: _gyro_sense(axis, gyros.sense_bartlett)},
-            lambda p: where(p.gyro.filter == cic, _CIC, _BARTLETT),
+            lambda p: where(p.gyro.filter == _CIC, _CIC, _BARTLETT),
         ),
-        Task(f"{name}_register", name, {cic: _gyro_register(axis)}, kind, senses, normals=4),
+        Task(f"{name}_register", name, {_CIC: _gyro_register(axis)}, kind, senses, normals=4),
         Task(f"{name}_sample", name, ways, kind, senses, normals=4),
     )
 

@@ -41,6 +41,10 @@ def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
 
 def both(a: Scalar, b: Scalar) -> Scalar:
     """Logical and of two conditions."""
+    if a is False or b is False:
+        return False
+    if a is True:
+        return b
     if _is_symbol(a) or _is_symbol(b):
         return _symbols().logic_and(a, b)
     return bool(a) and bool(b)

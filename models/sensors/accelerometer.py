@@ -14,9 +14,9 @@ from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 from ..record import Boolean, Enumeration, Integer, Item, Matrix3, Real, Vector3, choose
-from ..scalar import Scalar, absolute, clip, floor, maximum, minimum, where
+from ..scalar import Scalar, absolute, clip, floor, maximum, minimum, round_half_up, where
 from ..system import STOPPED
-from ..vectors import ZERO3, add, cross, dot, each_axis, multiply, scale
+from ..vectors import ZERO3, add, dot, each_axis, multiply, scale
 from .adxl355_sheet import ADXL355_2G, DELAYS, HIGH_PASS_CORNERS
 from .bandwidth import low_pass, low_pass_gain
 from .bias_instability import SIGMA_PER_INSTABILITY
@@ -74,6 +74,10 @@ SENSES_PER_CONVERSION = 4.0
 """Inputs taken per conversion of the part with Bartlett filters, for the sake of its bandwidth."""
 FIRST_STAGE_CURVATURE = 0.32
 """1 - |H| of the first stage at a quarter of its rate: -3.6 dB at 1 kHz (Rev. D p. 26), full path."""
+
+
+_SILENCE = 5e-4
+"""s for which the part falls silent after an overload (Rev. D p. 24)."""
 
 
 class AccelerometerParameters(NamedTuple):
@@ -169,6 +173,7 @@ class AccelerometerCoefficients(NamedTuple):
     sense_period: Annotated[float, Real("s", "time between inputs taken")]
     word_period: Annotated[float, Real("s", "time between register words")]
     low_pass_gain: Annotated[float, Real("1", "share of a step taken over in a sense period")]
+    silence: Annotated[float, Integer("inputs that an overload silences the part for")]
     taps: Annotated[FourTaps, Real("1", "weights of the first stage")]
     decimation: Annotated[float, Integer("inputs taken per register word")]
     latency: Annotated[float, Integer("sense periods from the end of a window to its word")]
@@ -228,6 +233,7 @@ def accelerometer_coefficients(
         sense_period=where(ideal > 0.5, STOPPED, 1.0 / frequency),
         word_period=decimation / frequency,
         low_pass_gain=low_pass_gain(part.bandwidth, 1.0 / frequency),
+        silence=round_half_up(_SILENCE * frequency),
         taps=delaying_taps(clip(rest - latency, 1.0, 2.0), FIRST_STAGE_CURVATURE),
         decimation=decimation,
         latency=latency,
@@ -239,7 +245,14 @@ def accelerometer_coefficients(
 
 def at_lever_arm(force: Vector3, rate: Vector3, angular_acceleration: Vector3, arm: Vector3) -> Vector3:
     """f + w' x r + w x (w x r): specific force at the arm r from the place where f is given."""
-    return add(force, add(cross(angular_acceleration, arm), cross(rate, cross(rate, arm))))
+    x, y, z = arm
+    (p, q, r), (a, b, c) = rate, angular_acceleration
+    along, square = p * x + q * y + r * z, p * p + q * q + r * r  # w x (w x r) = w (w r) - r w^2
+    return (
+        force[0] + (b * z - c * y) + (p * along - x * square),
+        force[1] + (c * x - a * z) + (q * along - y * square),
+        force[2] + (a * y - b * x) + (r * along - z * square),
+    )
 
 
 def _sensed(force: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients) -> Vector3:
@@ -327,17 +340,6 @@ def initial_accelerometer(
     return state, (filters[0][1], filters[1][1], filters[2][1])
 
 
-_SILENCE = 5e-4
-"""s for which the part falls silent after an overload (Rev. D p. 24)."""
-
-
-def _silenced(state: AccelerometerState, sensed: Vector3, p: AccelerometerParameters, period: Scalar) -> Scalar:
-    """Sense periods of silence left: an overload of any axis starts them anew."""
-    x, y, z = sensed
-    most = maximum(maximum(absolute(x), absolute(y)), absolute(z))
-    return where(most > p.overload, floor(_SILENCE / period + 0.5), maximum(state.silent - 1.0, 0.0))
-
-
 Sense = Callable[
     [AccelerometerState, Vector3, Vector3, AccelerometerParameters, AccelerometerCoefficients], AccelerometerState
 ]
@@ -347,8 +349,9 @@ def sense(
     state: AccelerometerState, force: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients
 ) -> AccelerometerState:
     """Step of the decimating part at the sampling frequency: an input enters the block, a due word the registers."""
-    x, y, z = felt = _sensed(force, factor, p, k)
-    silent = _silenced(state, felt, p, k.sense_period)
+    x, y, z = _sensed(force, factor, p, k)
+    most = maximum(maximum(absolute(x), absolute(y)), absolute(z))
+    silent = where(most > p.overload, k.silence, maximum(state.silent - 1.0, 0.0))
     heard = where(silent > 0.5, 0.0, 1.0)
     sensed = (heard * x, heard * y, heard * z)
     f = four_tapped(k.taps, sensed, state.before)

@@ -31,6 +31,7 @@ CHANNEL = Enumeration(
     "which channel",
     tunable=True,
 )
+_NONE, _STUCK, _DROPPED, _SPIKING, _DRIFTING, _SATURATED, LOST_FRAMES = (FAULT.value(item.name) for item in FAULT.items)
 _SPIKE = 2.5758293035489004
 """A standard normal draw lies beyond it once in a hundred."""
 
@@ -38,7 +39,7 @@ _SPIKE = 2.5758293035489004
 class FaultParameters(NamedTuple):
     """One fault."""
 
-    kind: Annotated[int, FAULT] = FAULT.value("none")
+    kind: Annotated[int, FAULT] = _NONE
     channel: Annotated[int, CHANNEL] = CHANNEL.value("gyro_1")
     start: Annotated[float, Real("s", "after the start of the run", min=0.0, tunable=True)] = 0.0
     end: Annotated[float, Real("s", "after the start of the run", min=0.0, tunable=True)] = 1e9
@@ -69,14 +70,14 @@ def faulted(
     value: Scalar, full_scale: Scalar, fault: FaultParameters, channel: int, time: Scalar, draw: Scalar
 ) -> Faulted:
     """The reading of a channel (from 0) under a fault; `draw` is a standard normal."""
-    kind = where(is_active(fault, channel, time), fault.kind, FAULT.value("none"))
+    kind = where(is_active(fault, channel, time), fault.kind, _NONE)
     size = fault.size * full_scale
     spike = where(absolute(draw) > _SPIKE, where(draw > 0.0, size, -size), 0.0)
-    added = where(kind == FAULT.value("spiking"), spike, 0.0)
-    added = where(kind == FAULT.value("drifting"), size * (time - fault.start), added)
+    added = where(kind == _SPIKING, spike, 0.0)
+    added = where(kind == _DRIFTING, size * (time - fault.start), added)
     end = where(fault.size < 0.0, -2.0, 2.0) * full_scale
     return Faulted(
-        where(kind == FAULT.value("saturated"), end, value + added),
-        where(kind == FAULT.value("stuck"), 1.0, 0.0),
-        where(kind == FAULT.value("dropped"), 1.0, 0.0),
+        where(kind == _SATURATED, end, value + added),
+        where(kind == _STUCK, 1.0, 0.0),
+        where(kind == _DROPPED, 1.0, 0.0),
     )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from faultless_parts import ADIS, GYRO, STILL, faultless, only_slow, run_of
 
-from attitude_fmu.models.attitude_sensor import MODEL
+from attitude_fmu.models.attitude_sensor import MODEL, SLOW_PERIOD
 from attitude_fmu.models.sensors import adis16354_words, adxl355_registers, adxrs450_frame, thermal
 from attitude_fmu.models.system import Run
 
@@ -55,64 +55,65 @@ def test_a_reading_is_the_temperature_to_half_a_step() -> None:
 # --- thermostat ------------------------------------------------------------------------------------------------------
 
 
-def heated(ambient: float, until: float, run: Run | None = None, **heater: float) -> Run:
-    """The enclosure at this ambient temperature in degC until then."""
-    if run is None:
-        values = {f"heater__{name}": value for name, value in heater.items()}
-        run = Run(MODEL, only_slow(heater__enabled=True, **values), at_celsius(ambient))
-    run.advance(at_celsius(ambient), until)
-    return run
+class Enclosure:
+    """An enclosure with a thermostat, switched on at an ambient temperature in degC."""
 
+    def __init__(self, ambient: float) -> None:
+        self.parameters = thermal.HeaterParameters(enabled=True)
+        self.state = thermal.initial_heater(ambient + 273.15)
 
-def enclosure(run: Run) -> float:
-    """degC"""
-    return run.state.slow.heater.temperature - 273.15
+    def after(self, seconds: float, ambient: float) -> float:
+        """Temperature in degC so much later."""
+        for _ in range(round(seconds / SLOW_PERIOD)):
+            self.state = thermal.heated(self.state, self.parameters, ambient + 273.15, SLOW_PERIOD)
+        return self.state.temperature - 273.15
 
 
 @pytest.mark.parametrize("ambient", [5.0, 20.0, 40.0])
 def test_the_thermostat_holds_its_setpoint(ambient: float) -> None:
-    run = heated(ambient, 600.0)
-    assert enclosure(run) == pytest.approx(45.0, abs=0.05)
-    power = (45.0 - ambient) / run.parameters.heater.largest_rise
-    assert run.state.slow.heater.integral == pytest.approx(power, abs=2e-3)
-    assert run.outputs().die_temperature.gyro == pytest.approx(318.15, abs=0.1)
+    enclosure = Enclosure(ambient)
+    assert enclosure.after(600.0, ambient) == pytest.approx(45.0, abs=0.05)
+    power = (45.0 - ambient) / enclosure.parameters.largest_rise
+    assert enclosure.state.integral == pytest.approx(power, abs=2e-3)
 
 
 def test_the_thermostat_cannot_do_more_than_full_power_nor_cool() -> None:
-    run = heated(-20.0, 120.0)
-    assert enclosure(run) == pytest.approx(-20.0 + 45.0 * (1 - math.exp(-1.0)))  # a first-order enclosure, full power
-    assert enclosure(heated(-20.0, 1500.0, run)) == pytest.approx(25.0, abs=1e-3)
-    assert enclosure(heated(60.0, 600.0)) == pytest.approx(60.0)
+    enclosure = Enclosure(-20.0)  # first order: full power gives 45 K (1 - exp(-t/120 s))
+    assert enclosure.after(120.0, -20.0) == pytest.approx(-20.0 + 45.0 * (1 - math.exp(-1.0)))
+    assert enclosure.after(1500.0, -20.0) == pytest.approx(25.0, abs=1e-3)
+    assert Enclosure(60.0).after(600.0, 60.0) == pytest.approx(60.0)
 
 
 def test_the_thermostats_integral_does_not_wind_up() -> None:
-    cold = heated(-20.0, 1500.0)  # full power for 25 minutes
-    assert 0.0 <= cold.state.slow.heater.integral <= 1.0
-    hottest, inside = -math.inf, 0.0
-    for time in range(1510, 2400, 10):
-        hottest = max(hottest, enclosure(heated(20.0, float(time), cold)))
-    inside = enclosure(cold)
-    assert hottest < 45.0 + 1.5
-    assert inside == pytest.approx(45.0, abs=0.05)
+    enclosure = Enclosure(-20.0)
+    enclosure.after(1500.0, -20.0)  # full power for 25 minutes
+    assert 0.0 <= enclosure.state.integral <= 1.0
+    course = [enclosure.after(10.0, 20.0) for _ in range(90)]
+    assert max(course) < 45.0 + 1.5
+    assert course[-1] == pytest.approx(45.0, abs=0.05)
+
+
+def test_a_thermostat_takes_nearly_all_of_a_slow_change_away() -> None:
+    held, waves = Enclosure(20.0), [20.0 + 8.0 * math.sin(0.1 * minute) for minute in range(70)]
+    held.after(900.0, 20.0)
+    assert np.ptp([held.after(60.0, ambient) for ambient in waves]) < 0.05 * np.ptp(waves)
+
+
+def test_the_whole_sensor_lies_in_the_enclosure() -> None:
+    p = only_slow(heater__enabled=True, gyro__bias_temperature_slope=(1e-4, 0.0, 0.0), gyro__thermal__warm_up=5.0)
+    run, alone = Run(MODEL, p, at_celsius(20.0)), Enclosure(20.0)
+    for minute in range(1, 4):
+        run.advance(at_celsius(20.0), 60.0 * minute)
+        alone.after(60.0, 20.0)
+        assert run.state.slow.heater == alone.state
+    assert run.outputs().die_temperature.gyro == pytest.approx(alone.state.temperature, abs=0.5)
+    warmer = run.outputs().die_temperature.gyro - 298.15
+    assert run.state.slow.gyro_offset[0] == pytest.approx(1e-4 * warmer)
 
 
 def test_without_heater_the_sensor_lies_at_ambient_temperature() -> None:
     run = run_of(only_slow(), at_celsius(30.0), 1.0)
-    assert enclosure(run) == pytest.approx(30.0)
-    assert run.state.slow.heater.integral == 0.0
-
-
-def test_a_thermostat_takes_most_of_a_days_temperature_out_of_the_bias() -> None:
-    slope = {"gyro__bias_temperature_slope": (1e-4, 0.0, 0.0)}
-    offsets = {}
-    for enabled in (False, True):
-        run = Run(MODEL, only_slow(heater__enabled=enabled, **slope), at_celsius(20.0))
-        run.advance(at_celsius(20.0), 900.0)
-        offsets[enabled] = []
-        for minute in range(60):
-            run.advance(at_celsius(20.0 + 8.0 * math.sin(0.1 * minute)), 900.0 + 60.0 * (minute + 1))
-            offsets[enabled].append(run.state.slow.gyro_offset[0])
-    assert np.ptp(offsets[True]) < 0.05 * np.ptp(offsets[False])
+    assert run.state.slow.heater == (pytest.approx(303.15), 0.0)
 
 
 # --- compensation ----------------------------------------------------------------------------------------------------
@@ -143,15 +144,13 @@ def test_compensation_takes_out_exactly_what_it_is_given(device: str) -> None:
         for name, value in {**ERRORS, "matrix": inverse}.items()
     }
     rate, force = (0.5, -0.6, 0.7), (3.0, 4.0, -5.0)
-    moving = at_celsius(65.0)._replace(rate=rate, specific_force=force)  # a whole number of steps of two thermometers
-    fine = {"gyro__thermometer__sensitivity": 1e6, "accelerometer__thermometer__sensitivity": 1e6}
+    moving = at_celsius(65.0)._replace(rate=rate, specific_force=force)
     p = faultless(device, True, gyro__g_sensitivity=push, **errors)
     raw = run_of(p, moving, 0.05).outputs()
     assert max(abs(a - b) for a, b in zip(raw.rate_measured, rate, strict=True)) > 0.01
-    limits = {"gyro__thermometer__sensitivity": 1000.0, "accelerometer__thermometer__sensitivity": 1000.0}
-    assert set(limits) == set(fine)
+    fine = {"gyro__thermometer__sensitivity": 1000.0, "accelerometer__thermometer__sensitivity": 1000.0}
     compensated = faultless(
-        device, True, gyro__g_sensitivity=push, compensation__g_sensitivity=push, **errors, **given, **limits
+        device, True, gyro__g_sensitivity=push, compensation__g_sensitivity=push, **errors, **given, **fine
     )
     shown = run_of(compensated, moving, 0.05).outputs()
     # what is left: the thermometers' half step of 1/2000 K
