@@ -47,7 +47,8 @@ static int is_in_range(const Moment *moment)
         if (moment->ticks[i] < 0 || moment->ticks[i] > (int64_t)1 << 53)
             return 0;
     return INSTANTIATED <= moment->stage && moment->stage <= TERMINATED &&
-           (moment->stage < STEPPING ? moment->time == moment->start_time : are_finite(moment->v + STATE_AT, STATES)) &&
+           (moment->stage >= STEPPING || moment->time == moment->start_time) &&
+           (moment->stage < STEPPING || moment->stale & STATE_STALE || are_finite(moment->v + STATE_AT, STATES)) &&
            are_finite(moment->slope, INPUTS) && fabs(moment->start_time) <= LATEST_TIME &&
            fabs(moment->time) <= LATEST_TIME;
 }
