@@ -19,6 +19,7 @@ from .build import Order
 from .catalogue import Entry
 from .description import build_description, model_description
 from .documentation import external_dependencies, index_page
+from .errors import BuildError
 from .native.c_code import model_source
 from .native.compile import PLATFORMS, compile_all
 from .sources import Sources, fingerprint_of, guid_of, license_of, sources_of, version
@@ -90,11 +91,22 @@ def pack(content: dict[str, bytes], archive: Path) -> None:
             fmu.writestr(item, content[name], compresslevel=9)
 
 
+def _model(entry: Entry) -> Model:
+    try:
+        model = importlib.import_module(entry.module).MODEL
+    except Exception as error:  # whatever a module of the user's raises
+        raise BuildError(f"module {entry.module}: {type(error).__name__}: {error}") from error
+    if not isinstance(model, Model):
+        raise BuildError(f"module {entry.module}: its MODEL is no Model of attitude_fmu.models.system")
+    return model
+
+
 def assemble(order: Order, archive: Path) -> None:
     """Make one FMU and write it to `archive`."""
-    model: Model = importlib.import_module(order.entry.module).MODEL
     fingerprint = fingerprint_of(order.entry, order.kind)
-    traced = trace(model)
+    traced = trace(_model(order.entry))
+    if fingerprint != fingerprint_of(order.entry, order.kind):
+        raise BuildError("its sources were changed while it was built; build it again")
     common = _common_content(order, traced, fingerprint)
     own = _python_content(order.entry) if order.kind == "python" else _native_content(order, traced, fingerprint)
     pack({**own, **common}, archive)
