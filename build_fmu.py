@@ -1,4 +1,7 @@
-"""Builds the FMUs of a release, of both kinds and for every platform: ``python build_fmu.py [NAME ...]``."""
+"""Builds the FMUs of a release, of both kinds and for every platform.
+
+``.venv/bin/python build_fmu.py [NAME ...]``
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,11 @@ import typer
 from rich.console import Console
 
 from attitude_fmu.fmu_src.build import Platforms
-from attitude_fmu.fmu_src.build_messages import Kinds, build_and_tell
+from attitude_fmu.fmu_src.build_messages import Kinds, build_and_tell, tell_other_sources
 from attitude_fmu.fmu_src.catalogue import CATALOGUE
 from attitude_fmu.models.errors import AttitudeFmuError
 
+_CHECKOUT = Path(__file__).resolve().parent
 _NAMES = ", ".join(entry.identifier for entry in CATALOGUE)
 
 
@@ -31,6 +35,7 @@ def main(
 
     From cold a full build takes a minute or two: the compiler makes the C library of every platform once.
     """
+    tell_other_sources(_CHECKOUT / "fmu_src", Console(stderr=True))
     try:
         build_and_tell(dist, names or None, Console(), kinds=kind, platforms=platform, always=True)
     except AttitudeFmuError as error:

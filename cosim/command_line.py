@@ -60,6 +60,7 @@ and for the gimbal loop_off.csv (the same run with the joints held).
 [bold]attitude-fmu info gimbal[/bold] lists what --set and --record take.
 """
 
+_DIST_HELP = "Folder of the FMUs that scenarios use and build."
 _FMU_HELP = "Kind of the FMUs that a scenario uses: compiled from C, or the same models run by Python."
 
 
@@ -105,9 +106,7 @@ def run_command(
         ),
     ] = None,
     fmu: Annotated[Kind | None, typer.Option(help=_FMU_HELP, show_default="native")] = None,
-    dist: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="Folder of the FMUs that scenarios use and build.")
-    ] = Path("dist"),
+    dist: Annotated[Path | None, typer.Option(metavar="FOLDER", help=_DIST_HELP, show_default="dist")] = None,
 ) -> None:
     """Couple FMUs, run them, and show what came out."""
     with _reported():
@@ -123,8 +122,7 @@ def run_command(
             master,
             tuple(record or ()),
             interval,
-            dist,
-            _kind(system, fmu),
+            *_of_scenario(system, dist, fmu),
         )
         run(request)
 
@@ -152,10 +150,10 @@ def build(
 def info(
     what: Annotated[str, typer.Argument(metavar="SYSTEM", help="An .fmu or .ssp file, or a scenario.")],
     fmu: Annotated[Kind | None, typer.Option(help=_FMU_HELP, show_default="native")] = None,
-    dist: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="Folder of the FMUs that scenarios use and build.")
-    ] = Path("dist"),
-    pattern: Annotated[str, typer.Option(metavar="TEXT", help="Show only what has this in its name.")] = "",
+    dist: Annotated[Path | None, typer.Option(metavar="FOLDER", help=_DIST_HELP, show_default="dist")] = None,
+    pattern: Annotated[
+        str, typer.Option(metavar="TEXT", help="Show only what has this in its name; * stands for anything.")
+    ] = "",
     everything: Annotated[
         bool, typer.Option("--all", help="Also inputs that are connected, calculated parameters and local variables.")
     ] = False,
@@ -167,7 +165,7 @@ def info(
     with _reported():
         from .info import show_info
 
-        show_info(what, dist, _kind(what, fmu), pattern, everything)
+        show_info(what, *_of_scenario(what, dist, fmu), pattern, everything)
 
 
 SENSOR_HELP = """Measure a modelled sensor and compare it with its datasheet.
@@ -243,10 +241,12 @@ def main() -> None:
     application()
 
 
-def _kind(what: str, fmu: Kind | None) -> Kind:
-    if fmu is not None and what.lower().endswith((".ssp", ".fmu")):
-        _refuse_usage(f"--fmu {fmu}: {what} is taken as it is; the option is for scenarios")
-    return fmu or "native"
+def _of_scenario(what: str, dist: Path | None, fmu: Kind | None) -> tuple[Path, Kind]:
+    """The options that only a scenario takes."""
+    for option, value in (("--fmu", fmu), ("--dist", dist)):
+        if value is not None and what.lower().endswith((".ssp", ".fmu")):
+            _refuse_usage(f"{option} {value}: {what} is taken as it is; the option is for scenarios")
+    return dist or Path("dist"), fmu or "native"
 
 
 _SETTING = "write it as component.variable=value, for instance sensor.seed=7"

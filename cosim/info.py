@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -39,11 +40,14 @@ class _Line(NamedTuple):
 def show_info(what: str, dist: Path, kind: Kind, pattern: str, everything: bool) -> None:
     """List what an FMU, an .ssp file or a scenario offers, of which the name contains `pattern`.
 
+    In `pattern` ``*`` stands for anything; case does not matter.
+
     Raises `SystemRefusedError` if nothing has it in its name.
     """
     listed = _listed(what, dist, kind)
-    groups = _grouped(listed, pattern)
-    wires = [wire for wire in listed.wired.values() if pattern in wire]
+    sought = re.compile(re.escape(pattern).replace(r"\*", ".*"), re.IGNORECASE)
+    groups = _grouped(listed, sought)
+    wires = [wire for wire in listed.wired.values() if sought.search(wire)]
     shown = {group: lines for group, lines in groups.items() if lines and (everything or group != _REST)}
     if not shown and not wires:
         more = "" if everything else "; --all shows the rest"
@@ -60,12 +64,12 @@ def _listed(what: str, dist: Path, kind: Kind) -> _Listed:
         return _Listed(interfaces, start_values(system, interfaces), wired)
 
 
-def _grouped(listed: _Listed, pattern: str) -> dict[str, list[_Line]]:
+def _grouped(listed: _Listed, sought: re.Pattern[str]) -> dict[str, list[_Line]]:
     groups: dict[str, list[_Line]] = {group: [] for group in _GROUPS}
     for component, interface in listed.interfaces.items():
         for variable in interface.variables.values():
             port = Port(component, variable.name)
-            if pattern in _full_name(port):
+            if sought.search(_full_name(port)):
                 start = listed.given.get(port, variable.start)
                 groups[_group_of(variable, port in listed.wired)].append(_Line(port, variable, start))
     return groups

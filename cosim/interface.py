@@ -146,11 +146,12 @@ def _digits(value: float) -> str:
     return str(int(value)) if value.is_integer() and abs(value) < 1e15 else f"{value:.9g}"
 
 
-def read_interface(fmu: Path) -> Interface:
+def read_interface(fmu: Path | str) -> Interface:
     """Read what an FMU file offers.
 
     Raises `SystemRefusedError` if the file is missing, is no FMU, or is not an FMI 2.0 co-simulation FMU.
     """
+    fmu = Path(fmu)
     if not fmu.is_file():
         raise SystemRefusedError(f"FMU not found: {fmu}")
     try:

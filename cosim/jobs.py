@@ -25,7 +25,7 @@ from .interrupts import ignored_interrupts, noted_interrupts
 from .master import Order, Outcome, Plan, plan_run, run_plan, spill_of
 from .recording import Recording, Results, keep, read_rows, rescue
 from .system import System
-from .workspace import safe_folder
+from .workspace import claimed, safe_folder
 
 _GRACE = 2.0
 """s, how long a run that is asked to stop may take for the step that it is in."""
@@ -237,11 +237,12 @@ def _outcomes(running: list[_Process], answers: dict[str, _Answer]) -> dict[str,
 
 def _rows(job: Job, crashed: bool) -> Results | None:
     spill = spill_of(job.results)
-    if crashed:
-        return rescue(spill, job.results)
-    rows = read_rows(spill)
-    spill.unlink(missing_ok=True)
-    return rows
+    with claimed(job.results):
+        if crashed:
+            return rescue(spill, job.results)
+        rows = read_rows(spill)
+        spill.unlink(missing_ok=True)
+        return rows
 
 
 def _stopped(error: RunStoppedError, rows: Results | None, crashed: bool) -> RunStoppedError:

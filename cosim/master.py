@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from ctypes import c_size_t, c_void_p, memmove
 from functools import partial
 from pathlib import Path
@@ -28,7 +28,7 @@ from .recording import Recording, Results, keep
 from .slave import WARNING, Feed, Slave
 from .span import Span, check_last_step
 from .system import Port, System, check, start_values
-from .workspace import fmu_folder
+from .workspace import claimed, fmu_folder
 
 Order = Literal["jacobi", "gauss-seidel"]
 _KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
@@ -51,11 +51,11 @@ def simulate(
     stop_time: float | None = None,
     step: float = 1e-3,
     order: Order = "gauss-seidel",
-    record: Sequence[str] | None = None,
+    record: Sequence[str] | str | None = None,
     interval: float | None = None,
-    results: Path | None = None,
+    results: Path | str | None = None,
     progress: Progress | None = None,
-    workspace: Path | None = None,
+    workspace: Path | str | None = None,
 ) -> Outcome:
     """Run a coupled system and record it.
 
@@ -66,16 +66,18 @@ def simulate(
     time (s) now and then; a KeyboardInterrupt from it, or Ctrl-C, ends the run. FMUs are unpacked in `workspace`, else
     in a temporary folder.
 
-    Raises `SystemRefusedError` for a system that cannot run, `RunStoppedError` when a run ends early.
+    Raises `SystemRefusedError` for a system that cannot run, `RunStoppedError` when a run ends early, `ResultsError`
+    if the results find no room or another run is writing there.
     """
     plan = plan_run(system, stop_time, step, order, record, interval)
+    path = None if results is None else Path(results)
 
     def close(recording: Recording) -> Results:
-        if results is not None:
-            keep(recording.filled(), results, recording.path)
+        if path is not None:
+            keep(recording.filled(), path, recording.path)
         return recording.close()
 
-    return run_plan(system, plan, results, progress, workspace, close)
+    return run_plan(system, plan, path, progress, None if workspace is None else Path(workspace), close)
 
 
 class Plan(NamedTuple):
@@ -92,7 +94,7 @@ def plan_run(
     stop_time: float | None,
     step: float,
     order: Order,
-    record: Sequence[str] | None,
+    record: Sequence[str] | str | None,
     interval: float | None,
 ) -> Plan:
     """Check a system and what is wanted of it, as `simulate` takes it, without touching any file.
@@ -104,7 +106,8 @@ def plan_run(
     check_last_step(span, interfaces)
     if order not in get_args(Order):
         raise SystemRefusedError(f"order = {order}: not one of {', '.join(get_args(Order))}")
-    return Plan(interfaces, span, order, _columns(record, interfaces))
+    patterns = (record,) if isinstance(record, str) else record
+    return Plan(interfaces, span, order, _columns(patterns, interfaces))
 
 
 def run_plan(
@@ -117,6 +120,7 @@ def run_plan(
 ) -> Outcome:
     """Run what `plan_run` has checked; `close` gets the recording however the run ends, and gives what to pass on."""
     with (
+        nullcontext() if results is None else claimed(results),
         fmu_folder(workspace) as folder,
         noted_interrupts() as interrupted,
         closing(_Coupled(system, plan, folder)) as coupled,

@@ -34,17 +34,23 @@ class Recording:
         self.path = path
         self.length = 0
         self.rows: Results
-        if path is None:
-            self.rows = np.zeros(capacity, dtype)
-        else:
-            try:
+        try:
+            if path is None:
+                self.rows = np.zeros(capacity, dtype)
+            else:
                 self.rows = open_memmap(path, mode="w+", dtype=dtype, shape=(capacity,))
                 _allocate(path)
-            except OSError as error:
+        except (OSError, MemoryError) as error:
+            size = f"{capacity} rows of {dtype.itemsize} bytes ({capacity * dtype.itemsize / 1e6:.1f} MB)"
+            if path is None:
+                why = "in memory"
+            else:
                 with suppress(OSError):
                     path.unlink(missing_ok=True)
-                size = capacity * dtype.itemsize / 1e6
-                raise ResultsError(f"cannot keep {size:.1f} MB of results in {path}: {error.strerror}") from error
+                why = f"in {path}: {getattr(error, 'strerror', None) or 'not enough memory'}"
+            raise ResultsError(
+                f"cannot keep {size} {why}; a longer recording interval (--interval) makes fewer"
+            ) from error
         # a view of the plain kind, which is much faster to index than a memory map
         self.rows = self.rows.view(np.ndarray)
         self.address = self.rows.ctypes.data
@@ -122,11 +128,12 @@ def rescue(spill: Path, path: Path) -> Results | None:
     return results
 
 
-def write_csv(path: Path, results: Results, columns: Iterable[str] | None = None) -> Path:
+def write_csv(path: Path | str, results: Results, columns: Iterable[str] | None = None) -> Path:
     """Write results as ``fmpy.write_csv`` does, the same bytes, about a hundred times faster.
 
     Raises `ResultsError` if the file cannot be written.
     """
+    path = Path(path)
     if columns is not None:
         results = results[["time", *columns]]
     names = results.dtype.names or ()
@@ -138,13 +145,13 @@ def write_csv(path: Path, results: Results, columns: Iterable[str] | None = None
     return path
 
 
-def read_csv(path: Path) -> Results:
+def read_csv(path: Path | str) -> Results:
     """Read results that `write_csv` or FMPy wrote, Booleans included (on which ``fmpy.read_csv`` stumbles).
 
     Raises `ResultsError` if the file is missing or holds no table of results.
     """
     try:
-        with path.open(encoding="utf-8") as file:
+        with Path(path).open(encoding="utf-8") as file:
             names = [name.strip().strip('"') for name in file.readline().split(",")]
             first = file.readline().strip().split(",")
             if names[0] != "time":

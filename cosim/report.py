@@ -24,7 +24,7 @@ SETTLING = 2.0
 COARSEST = 0.010
 """s between records, beyond which jitter would be missed."""
 
-_UNALIGNED = "The sensor did not finish its alignment: no errors to show."
+_UNALIGNED = "The sensor did not finish its alignment before the end: no errors to show."
 
 Signal = NDArray[np.float64]
 
@@ -206,6 +206,9 @@ def report(
     truth, sensor = roles.truth, roles.sensor
     told = truth is not None and _recorded(names, truth)
     aligned = aligned_at(results, sensor) if sensor and f"{sensor}.aligned" in names else None
+    if aligned is not None and aligned >= results["time"][-1]:
+        # a single record is no error to speak of
+        aligned = None
     unaligned = f"{sensor}.aligned" in names and aligned is None
     errors: tuple[AngleError, ...] = ()
     true = truth if told else attitude

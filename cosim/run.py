@@ -22,6 +22,7 @@ from .report import Roles, report, roles_of, table
 from .scenarios import Scenario, opened
 from .ssp import read_ssv, write_ssp, write_ssv
 from .system import Port, System, check, parameters_used, start_values
+from .workspace import claimed
 
 _RESULTS, _LOOP_OFF, _PICTURE = "results.csv", "loop_off.csv", "overview.png"
 _SYSTEM, _PARAMETERS = "system.ssp", "parameters.ssv"
@@ -79,8 +80,9 @@ def run(request: Request) -> None:
         for job in jobs:
             check_job(job)
         _keep_what_was_given(request)
-        outcomes = _outcomes(jobs, interfaces, request.out)
-        _show(request, found, jobs[0].stop_time, outcomes)
+        with _owned(request.out):
+            outcomes = _outcomes(jobs, interfaces, request.out)
+            _show(request, found, jobs[0].stop_time, outcomes)
 
 
 # --- what is run ----------------------------------------------------------------------------------------------------
@@ -143,14 +145,19 @@ def _keep_what_was_given(request: Request) -> None:
 # --- running and writing --------------------------------------------------------------------------------------------
 
 
-def _outcomes(jobs: list[Job], interfaces: Mapping[str, Interface], out: Path) -> dict[str, Outcome]:
-    """Run the jobs; nothing in the folder `out` changes unless there are new results."""
+@contextmanager
+def _owned(out: Path) -> Iterator[None]:
     try:
         out.mkdir(parents=True, exist_ok=True)
-        drafts = tempfile.TemporaryDirectory(prefix=".run_", dir=out)
     except OSError as error:
         raise ResultsError(f"cannot write into {out}: {error.strerror or error}") from error
-    with drafts as name:
+    with claimed(out):
+        yield
+
+
+def _outcomes(jobs: list[Job], interfaces: Mapping[str, Interface], out: Path) -> dict[str, Outcome]:
+    """Run the jobs; nothing in the folder `out` changes unless there are new results."""
+    with tempfile.TemporaryDirectory(prefix=".run_", dir=out) as name:
         system = jobs[0].system
         files = [
             write_ssp(system, Path(name) / _SYSTEM),

@@ -208,7 +208,7 @@ def _spectrum(axes: Axes, drawn: _Drawn) -> None:
         _line(axes, y, datum.confidence)
         text = f"{datum.value:g} {_plain(datum.unit)}"
         axes.text(0.98, y, text, transform=axes.get_yaxis_transform(), ha="right", **_over())
-    axes.set_ylim(bottom=0.03 * float(np.median(density)) / size)
+    axes.set_ylim(bottom=max(0.03 * float(np.median(density)), 0.3 * float(np.min(density))) / size)
     _plain_ticks(axes)
     axes.set_xlabel("frequency (Hz)", labelpad=1)
     axes.legend(loc="lower left")

@@ -63,11 +63,12 @@ _ADVICE = {
 # --- writing -----------------------------------------------------------------------------------------------------
 
 
-def write_ssp(system: System, path: Path) -> Path:
+def write_ssp(system: System, path: Path | str) -> Path:
     """Write a system with its FMUs as an ``.ssp`` archive; the same system gives the same bytes.
 
     Raises `SystemRefusedError` if the system cannot run as described, `ResultsError` if the file cannot be written.
     """
+    path = Path(path)
     interfaces = check(system)
     resources = _resource_names(system)
     parameter_sets = _sets_by_component(system, interfaces)
@@ -86,13 +87,14 @@ def write_ssp(system: System, path: Path) -> Path:
     return path
 
 
-def write_ssv(parameters: ParameterSet, path: Path, interfaces: Mapping[str, Interface]) -> Path:
+def write_ssv(parameters: ParameterSet, path: Path | str, interfaces: Mapping[str, Interface]) -> Path:
     """Write a parameter set with names ``component.variable`` as an ``.ssv`` file, with the units that it gives.
 
     Under the component ``""`` names are those of the FMU, as a set that is bound to a component has them.
 
     Raises `ResultsError` if the file cannot be written.
     """
+    path = Path(path)
     variables = {
         f"{component}.{name}" if component else name: variable
         for component, interface in interfaces.items()
@@ -293,13 +295,13 @@ def _text(variable: Variable, value: Value) -> str:
 
 
 @contextmanager
-def open_ssp(path: Path) -> Iterator[System]:
+def open_ssp(path: Path | str) -> Iterator[System]:
     """Read a system from an ``.ssp`` archive; its FMUs lie in a temporary directory for as long as it is open.
 
     Raises `SystemRefusedError` for a file that is missing, malformed, or asks for what is not supported.
     """
     with TemporaryDirectory(prefix="attitude_fmu_") as directory:
-        yield read_ssp(path, Path(directory))
+        yield read_ssp(Path(path), Path(directory))
 
 
 def read_ssp(path: Path, directory: Path) -> System:
@@ -318,11 +320,12 @@ def read_ssp(path: Path, directory: Path) -> System:
         raise ResultsError(f"cannot unpack {path}: {error.strerror or error}") from error
 
 
-def read_ssv(path: Path) -> ParameterSet:
+def read_ssv(path: Path | str) -> ParameterSet:
     """Read a parameter set with names ``component.variable`` from an ``.ssv`` file.
 
     Raises `SystemRefusedError` for a file that is missing or malformed.
     """
+    path = Path(path)
     if not path.is_file():
         raise SystemRefusedError(f"file not found: {path}")
     root = _parsed(path.read_bytes(), path.name, "SystemStructureParameterValues.xsd")

@@ -16,11 +16,16 @@ from .interface import Interface, Unit, Value, Variable, read_interface
 _WHOLE = {"Integer", "Boolean", "Enumeration"}
 
 
-class Component(NamedTuple):
+@dataclass(frozen=True, init=False)
+class Component:
     """An FMU under the name that it has in the system."""
 
     name: str
     fmu: Path
+
+    def __init__(self, name: str, fmu: Path | str) -> None:
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "fmu", Path(fmu))
 
 
 class Port(NamedTuple):
@@ -143,7 +148,9 @@ def start_values(system: System, interfaces: Mapping[str, Interface]) -> dict[Po
                     f"{port} is {_article(variable.causality)}, which cannot be set; parameters and inputs can"
                 )
             if port in wired:
-                raise SystemRefusedError(f"{port} cannot be set: {wired[port].source} is connected to it")
+                source = wired[port].source
+                hint = _parameters_behind(source, interfaces)
+                raise SystemRefusedError(f"{port} cannot be set: {source} is connected to it{hint}")
             if name in parameter_set.units:
                 _check_given_unit(port, parameter_set.units[name], variable, interfaces)
             try:
@@ -151,6 +158,14 @@ def start_values(system: System, interfaces: Mapping[str, Interface]) -> dict[Po
             except SystemRefusedError as error:
                 raise SystemRefusedError(f"{port.component}.{error}") from None
     return values
+
+
+def _parameters_behind(source: Port, interfaces: Mapping[str, Interface]) -> str:
+    """A hint that names the parameters of a component which are called like its output."""
+    stem = source.variable.partition("[")[0]
+    variables = interfaces[source.component].variables.values() if source.component in interfaces else ()
+    found = [v.name for v in variables if v.causality == "parameter" and v.settable and stem in v.name]
+    return f"; set {' or '.join(f'{source.component}.{name}' for name in found[:3])}" if found else ""
 
 
 def parameters_used(system: System, interfaces: Mapping[str, Interface]) -> ParameterSet:

@@ -17,6 +17,58 @@ _SAFE_PATH = re.compile(r"[A-Za-z0-9_./\\:~-]+")
 
 
 @contextmanager
+def claimed(path: Path) -> Iterator[None]:
+    """Keep other runs away from a file or folder, until the end of the block or of the process, however that ends.
+
+    Raises `ResultsError` if another run has it.
+    """
+    lock = path / ".run.lock" if path.is_dir() else path.with_name(f".{path.name}.lock")
+    try:
+        handle = _locked(lock)
+    except OSError as error:
+        raise ResultsError(f"cannot write {'into ' * path.is_dir()}{path}: {error.strerror or error}") from error
+    if handle is None:
+        raise ResultsError(f"another run is writing into {path}; let it end, or choose another place")
+    try:
+        yield
+    finally:
+        if sys.platform != "win32":
+            lock.unlink(missing_ok=True)
+        os.close(handle)
+
+
+if sys.platform == "win32":
+
+    def _locked(lock: Path) -> int | None:
+        try:
+            # the system removes the file when the process is gone
+            return os.open(lock, os.O_CREAT | os.O_EXCL | os.O_TEMPORARY)
+        except (FileExistsError, PermissionError):
+            return None
+
+else:
+    import fcntl
+
+    def _locked(lock: Path) -> int | None:
+        while True:
+            handle = os.open(lock, os.O_CREAT | os.O_RDWR, 0o644)
+            try:
+                # the system takes the lock back when the process is gone; the file may stay
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                os.close(handle)
+                return None
+            except OSError:
+                # a file system without locks
+                return handle
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(handle), os.stat(lock)):
+                    return handle
+            # the one who had it removed the file in between
+            os.close(handle)
+
+
+@contextmanager
 def whole_or_not(path: Path) -> Iterator[Path]:
     """A file beside `path` to write to; it takes the place of `path` when all went well, else it is removed.
 

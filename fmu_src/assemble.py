@@ -17,6 +17,7 @@ from .build import Order
 from .catalogue import Entry, model_of
 from .description import build_description, model_description
 from .documentation import external_dependencies, index_page
+from .errors import BuildError
 from .native.c_code import model_source
 from .native.compile import PLATFORMS, compile_all
 from .sources import Sources, fingerprint_of, guid_of, license_of, sources_of, version
@@ -92,6 +93,8 @@ def assemble(order: Order, archive: Path) -> None:
     """Make one FMU and write it to `archive`."""
     fingerprint = fingerprint_of(order.entry, order.kind)
     traced = trace(model_of(order.entry))
+    if fingerprint != fingerprint_of(order.entry, order.kind):
+        raise BuildError("its sources were changed while it was built; build it again")
     common = _common_content(order, traced, fingerprint)
     own = _python_content(order.entry) if order.kind == "python" else _native_content(order, traced, fingerprint)
     pack({**own, **common}, archive)

@@ -94,11 +94,14 @@ def _assembled(entry: Entry, kind: Kind, platforms: Platforms, archive: Path) ->
         [sys.executable, "-P", "-m", f"{__package__}.assemble", order.to_json(), str(archive)],
         env={**os.environ, "PYTHONPATH": _search_path(), "PYTHONDONTWRITEBYTECODE": "1"},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
+        errors="replace",
         check=False,
     )
     if done.returncode != 0:
-        raise BuildError(f"{entry.identifier} could not be built:\n{(done.stderr or done.stdout).strip()}")
+        said = (done.stderr or done.stdout).strip()
+        separator = "\n" if "\n" in said else " "
+        raise BuildError(f"{entry.identifier} could not be built:{separator}{said}")
 
 
 def build(

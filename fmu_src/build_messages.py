@@ -40,6 +40,13 @@ def build_and_tell(
         _build_kind(dist, names, console, kind, platforms, always, only_built)
 
 
+def tell_other_sources(expected: Path, console: Console) -> None:
+    """Warn if what builds is not the folder `expected`, but an installed copy, which edits there do not reach."""
+    actual = Path(__file__).resolve().parent
+    if actual != expected.resolve():
+        _print(console, f"warning: building from {actual.parent}, not from {expected.parent}: pip install -e . there")
+
+
 def _check_compiler(platforms: Platforms, option: str) -> None:
     try:
         compiler()

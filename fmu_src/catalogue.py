@@ -100,9 +100,20 @@ def entry(identifier: str) -> Entry:
     raise BuildError(f"there is no FMU called {identifier}; there are {known}, and AttitudeSensor with {devices}")
 
 
+def _written(entry: Entry) -> Model:
+    """The model as its module defines it."""
+    try:
+        model = importlib.import_module(entry.module).MODEL
+    except Exception as error:  # whatever a module of the user's raises
+        raise BuildError(f"module {entry.module}: {type(error).__name__}: {error}") from error
+    if not isinstance(model, Model):
+        raise BuildError(f"module {entry.module}: its MODEL is no Model of attitude_fmu.models.system")
+    return model
+
+
 def model_of(entry: Entry) -> Model:
     """The model of an entry, with the entry's start values."""
-    model: Model = importlib.import_module(entry.module).MODEL
+    model = _written(entry)
     if not entry.starts:
         return model
     try:

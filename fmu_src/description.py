@@ -205,7 +205,7 @@ def build_description(entry: Entry) -> bytes:
     """sources/buildDescription.xml as bytes: how to compile the C sources (in the form of FMI 3.0, as 2.0.4 has it)."""
     root = etree.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = etree.SubElement(root, "BuildConfiguration", modelIdentifier=entry.identifier)
-    files = etree.SubElement(configuration, "SourceFileSet", language="C99")
+    files = etree.SubElement(configuration, "SourceFileSet", language="C11")
     etree.SubElement(files, "SourceFile", name=SOURCE_FILE)
     xml: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     return xml

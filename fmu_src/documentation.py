@@ -12,7 +12,7 @@ from ..models.sensors.devices import DEVICES, origins, parameters
 from ..models.system import Model
 from .catalogue import Entry, Kind
 from .interface import Variable, interface_of
-from .units import completed
+from .units import completed, display_of
 from .wording import descriptions
 
 _EXTERNAL_DEPENDENCIES: dict[Kind, str] = {
@@ -90,13 +90,24 @@ def _start(variable: Variable) -> str:
         return ""
     if isinstance(variable.fact, Enumeration):
         return variable.fact.items[int(variable.start) - 1].name
-    return str(variable.start).lower() if isinstance(variable.start, bool) else f"{variable.start:.10g}"
+    if isinstance(variable.start, bool):
+        return str(variable.start).lower()
+    display = _display(variable)
+    shown = ""
+    if display is not None and variable.start:
+        factor, offset = display_of(display, variable.fact.unit)
+        shown = f" ({factor * variable.start + offset:.6g} {display})"
+    return f"{variable.start:.10g}{shown}"
+
+
+def _display(variable: Variable) -> str | None:
+    """The unit that values are shown in, None if it is the variable's own."""
+    return completed(variable.fact).display if isinstance(variable.fact, Real) else None
 
 
 def _unit(variable: Variable) -> str:
-    fact = variable.fact
-    unit = "" if fact.unit == "1" else fact.unit
-    display = completed(fact).display if isinstance(fact, Real) else None
+    unit = "" if variable.fact.unit == "1" else variable.fact.unit
+    display = _display(variable)
     return unit if display is None else f"{unit} ({display})"
 
 
@@ -200,6 +211,21 @@ may contradict.</p>
 """
 
 
+def _with_contents(body: str) -> str:
+    """A page's body with a list of its headings before the first of them; a record is listed after its heading."""
+    links: list[str] = []
+
+    def named(heading: re.Match[str]) -> str:
+        level, text = heading[1], heading[2]
+        name = f"{len(links)}-{re.sub(r'[^a-z0-9]+', '-', text.lower())}"
+        links.append(f'{"<br>" if level == "2" and links else ""}<a href="#{name}">{text}</a>')
+        return f'<h{level} id="{name}">{text}</h{level}>'
+
+    before, first, after = body.partition("<h2>")
+    rest = re.sub(r"<h([23])>(.*?)</h\1>", named, first + after)
+    return f"{before}<p>{' '.join(links)}</p>\n{rest}"
+
+
 def index_page(model: Model, entry: Entry, kind: Kind, version: str) -> str:
     """documentation/index.html: conventions, errors, and every variable with unit, range and meaning."""
     interface = interface_of(model)
@@ -217,10 +243,7 @@ def index_page(model: Model, entry: Entry, kind: Kind, version: str) -> str:
         for heading, causality, prefix in sections
     )
     title = html.escape(model.name)
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head><meta charset="utf-8"><title>{title}</title><style>{_STYLE}</style></head>
-<body>
+    body = _with_contents(f"""\
 <h1>{title}</h1>
 <p>{html.escape(model.description)}</p>
 <p>{html.escape(entry.about)}</p>
@@ -231,6 +254,11 @@ def index_page(model: Model, entry: Entry, kind: Kind, version: str) -> str:
 results at common times for the same inputs. {_SOURCES[kind]}</p>
 <h2>Errors</h2>
 <p>{_ERRORS.format(refusal=_REFUSAL[kind])}</p>
-{_legend(entry)}{tables}</body>
+{_legend(entry)}{tables}""")
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head><meta charset="utf-8"><title>{title}</title><style>{_STYLE}</style></head>
+<body>
+{body}</body>
 </html>
 """

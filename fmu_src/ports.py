@@ -10,7 +10,7 @@ from collections.abc import Callable
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from ..models.record import Boolean, Enumeration
+from ..models.record import Boolean, Enumeration, Integer
 from .errors import CallRefusedError
 from .interface import Interface, Variable
 
@@ -24,6 +24,7 @@ REAL, INTEGER, BOOLEAN = ("Real",), ("Integer", "Enumeration"), ("Boolean",)
 
 _PLAN_LIMIT = 1000
 _LARGEST = sys.float_info.max
+_INT32 = (-(2.0**31), 2.0**31 - 1.0)
 
 References = tuple[int, ...]
 
@@ -52,7 +53,8 @@ def limits_of(variable: Variable) -> tuple[float, float]:
         return 0.0, 1.0
     if isinstance(fact, Enumeration):
         return 1.0, float(len(fact.items))
-    return -_LARGEST if fact.min is None else fact.min, _LARGEST if fact.max is None else fact.max
+    low, high = _INT32 if isinstance(fact, Integer) else (-_LARGEST, _LARGEST)
+    return low if fact.min is None else fact.min, high if fact.max is None else fact.max
 
 
 def cast_of(variable: Variable) -> Callable[[Any], Any]:

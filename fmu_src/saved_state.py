@@ -18,6 +18,8 @@ _CHECKSUM = struct.Struct("<I")
 INSTANTIATED, INITIALISING, STEPPING, STOPPED, TERMINATED = range(5)
 """The stages of an instance's life, in their order."""
 
+STAGE_NAMES = ("INSTANTIATED", "INITIALISING", "STEPPING", "STOPPED", "TERMINATED")
+
 STAGES = (
     "the instance is not initialised yet",
     "the instance is being initialised, which fmi2ExitInitializationMode ends",
@@ -28,7 +30,11 @@ STAGES = (
 """Why a call is refused in each stage."""
 
 TIME_SLACK = 1e-6
-"""Part of a step by which a host's communication point may miss the end of the step before: hosts add up."""
+"""Part of a step (of 1 s at most) by which a host's communication point may miss the end of the step before: hosts
+add up."""
+
+TIME_ROUNDING = 1e-9
+"""s by which it may miss in any case."""
 
 
 class SavedState(NamedTuple):

@@ -34,6 +34,7 @@ from .saved_state import (
     STEPPING,
     STOPPED,
     TERMINATED,
+    TIME_ROUNDING,
     TIME_SLACK,
     DamagedState,
     SavedState,
@@ -118,7 +119,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             run.restore(Snapshot(tuple(flatten(state)), counts))
             raise
         self._stage = STEPPING
-        self._time = until
+        self._time = max(until, self._time)
         return True
 
     @guarded
@@ -133,13 +134,18 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                 f"a step of {digits(step_size)} s from t = {digits(current_time)} s "
                 f"(allowed: forwards, up to {digits(LATEST_TIME)} s)"
             )
-        if not abs(current_time - self._time) <= TIME_SLACK * step_size + 1e-9:
+        if not abs(current_time - self._time) <= TIME_SLACK * min(step_size, 1.0) + TIME_ROUNDING:
             raise CallRefusedError(
                 f"a step from t = {digits(current_time)} s, but the FMU stands at t = {digits(self._time)} s"
             )
 
     def _parameters(self, values: list[Any]) -> Any:
         return unflatten(self.model.Parameters, values[self._ports.interface.parameters])
+
+    def _fixed(self, values: list[Any]) -> list[Any]:
+        """The values of the parameters that cannot be tuned."""
+        parameters = self._ports.interface.variables[self._ports.interface.parameters]
+        return [values[v.value_reference] for v in parameters if v.variability == "fixed"]
 
     def _current_run(self) -> Run:
         """The run with all that was set until now."""
@@ -255,7 +261,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def _get_fmu_state(self) -> SavedState:
-        snapshot = self._current_run().snapshot() if self._stage >= STEPPING else Snapshot((), ())
+        # as it stands: parameters that disagree are refused when they come to act, not here
+        snapshot = Snapshot((), ()) if self._run is None or self._stage < STEPPING else self._run.snapshot()
         return SavedState(
             self.fingerprint,
             self._stage,
@@ -274,15 +281,17 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         settable = [cast(value) for cast, value in zip(self._ports.casts, saved.settable, strict=True)]
         self._run = self._restored(saved, settable) if saved.stage >= STEPPING else None
         self._values[: len(settable)] = settable
-        self._inputs, self._parameters_changed = None, False
+        self._inputs = None
+        self._parameters_changed = self._run is not None and self._run.parameters != self._parameters(settable)
         self._stage, self._start_time, self._time = saved.stage, saved.start_time, saved.time
         self._stale = EVERYTHING
 
     def _restored(self, saved: SavedState, settable: list[Any]) -> Run:
-        parameters, run = self._parameters(settable), self._run
-        if run is None or run.start_time != saved.start_time or run.parameters != parameters:
+        run = self._run
+        is_same = run is not None and run.start_time == saved.start_time
+        if run is None or not (is_same and self._fixed(settable) == self._fixed(self._values)):
             inputs = unflatten(self.model.Inputs, settable[self._ports.interface.inputs])
-            run = Run(self.model, parameters, inputs, saved.start_time, self.instance_name)
+            run = Run(self.model, self._parameters(settable), inputs, saved.start_time, self.instance_name)
         run.restore(Snapshot(saved.state, saved.counts))
         return run
 

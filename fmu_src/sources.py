@@ -12,6 +12,7 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import re
+import sys
 from collections.abc import Iterator
 from importlib.machinery import ModuleSpec
 from pathlib import Path
@@ -59,6 +60,24 @@ def _imported(name: str, is_package: bool, tree: ast.AST) -> Iterator[str]:
             yield from (f"{base}.{alias.name}" for alias in node.names)
 
 
+def _followed(name: str, imported: list[str]) -> list[str]:
+    """Which of its imports go into an FMU with a module: ours, and those of its own package.
+
+    Raises `BuildError` where a user's module imports what does not: such an FMU would lack it, or hide its changes.
+    """
+    own = name.partition(".")[0] if "." in name else _PACKAGE
+    followed = [other for other in imported if other.startswith((f"{_PACKAGE}.", f"{own}."))]
+    if not name.startswith(f"{_PACKAGE}."):
+        for other in imported:
+            top = other.partition(".")[0]
+            if top not in (_PACKAGE, own) and top not in sys.stdlib_module_names:
+                raise BuildError(
+                    f"module {name} imports {other}: a model may import the standard library, {_PACKAGE}.models and "
+                    "its own package; put it there"
+                )
+    return followed
+
+
 def _closure(roots: list[str]) -> dict[str, Path]:
     found: dict[str, Path] = {}
     waiting = list(roots)
@@ -69,8 +88,11 @@ def _closure(roots: list[str]) -> dict[str, Path]:
             continue
         found[name] = Path(spec.origin)
         is_package = spec.submodule_search_locations is not None
-        tree = ast.parse(found[name].read_bytes())
-        waiting += [other for other in _imported(name, is_package, tree) if other.startswith(f"{_PACKAGE}.")]
+        try:
+            tree = ast.parse(found[name].read_bytes())
+        except SyntaxError as error:
+            raise BuildError(f"module {name}: line {error.lineno}: {error.msg}") from error
+        waiting += _followed(name, list(_imported(name, is_package, tree)))
         waiting += [name.rsplit(".", 1)[0]] if name.count(".") > 1 else []
     return found
 

@@ -6,13 +6,15 @@ traced function reads and writes places of it.
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import casadi
 
-from ..models.record import flatten, unflatten
+from ..models.record import flatten, leaves, unflatten
 from ..models.system import Model, Task
 from .errors import BuildError
 from .interface import Interface, interface_of
@@ -63,14 +65,66 @@ class Trace(NamedTuple):
     initial_dependencies: dict[int, tuple[int, ...]]
 
 
+def _refuse_float(self: Any) -> float:
+    raise TypeError("a signal is no number while the model is traced")
+
+
 @contextmanager
 def _as_written() -> Iterator[None]:
-    """Keep expressions as the model writes them: simplified ones would differ from the floats in the last bits."""
+    """Keep expressions as the model writes them: simplified ones would differ from the floats in the last bits.
+
+    CasADi would hand a function of ``math`` a NaN for a symbol; here it is refused.
+    """
+    as_float = casadi.SX.__float__
     casadi.GlobalOptions.setSimplificationOnTheFly(False)
+    casadi.SX.__float__ = _refuse_float  # type: ignore[method-assign]
     try:
         yield
     finally:
+        casadi.SX.__float__ = as_float  # type: ignore[method-assign]
         casadi.GlobalOptions.setSimplificationOnTheFly(True)
+
+
+_HINTS = {
+    "__bool__": "an if, and, or, not, min or max on a signal; use where(condition, a, b), both, either, minimum, "
+    "maximum of attitude_fmu.models.scalar",
+    "_refuse_float": "a signal given to what takes numbers only; use the functions of attitude_fmu.models.scalar "
+    "instead of math's",
+}
+"""What a model's author did, by the function that CasADi's symbols end in."""
+
+_NOT_THE_MODELS = (Path(casadi.__file__).parent, Path(__file__).parent)
+
+
+def _place_in_model(error: Exception) -> tuple[str, str]:
+    """``file.py:line in function`` of the model where an error arose, nothing if not in there; and a hint."""
+    frames = traceback.extract_tb(error.__traceback__)
+    inside = [one for one in frames if not any(Path(one.filename).is_relative_to(room) for room in _NOT_THE_MODELS)]
+    own = [one for one in inside if Path(one.filename).name != "scalar.py"] or inside
+    where = f" ({Path(own[-1].filename).name}:{own[-1].lineno} in {own[-1].name})" if own else ""
+    return where, _HINTS.get(frames[-1].name, f"{type(error).__name__}: {str(error).partition(chr(10))[0]}")
+
+
+@contextmanager
+def _told(model: Model, what: str) -> Iterator[None]:
+    """Turn whatever a model's function raises into a `BuildError` that says which it was, and where."""
+    try:
+        yield
+    except BuildError:
+        raise
+    except Exception as error:
+        where, why = _place_in_model(error)
+        raise BuildError(f"{model.name}: {what}: {why}{where}") from error
+
+
+def _filled(model: Model, what: str, record: type, value: Any) -> tuple[Any, ...]:
+    """The scalars of the record that a model's function returns."""
+    if not isinstance(value, record):
+        raise BuildError(f"{model.name}: {what} must return {record.__name__}, gave {type(value).__name__}")
+    scalars, wanted = flatten(value), len(leaves(record))
+    if len(scalars) != wanted:
+        raise BuildError(f"{model.name}: {what} must give {wanted} numbers in {record.__name__}, gave {len(scalars)}")
+    return tuple(scalars)
 
 
 class _Symbols:
@@ -100,12 +154,14 @@ def _step(model: Model, symbols: _Symbols, name: str, task: Task, step: Callable
     """A task's step, of which only what changes is written back."""
     z = casadi.SX.sym("z", task.normals)
     draws = tuple(z[i] for i in range(task.normals))
-    after = flatten(step(symbols.x, symbols.u, symbols.p, symbols.k, draws))
-    moved = [
-        (place, casadi.SX(new))
-        for place, old, new in zip(_places(symbols.places.state), flatten(symbols.x), after, strict=True)
-        if new is not old
-    ]
+    what = f"task {task.name}"
+    with _told(model, what):
+        after = _filled(model, what, model.State, step(symbols.x, symbols.u, symbols.p, symbols.k, draws))
+        moved = [
+            (place, casadi.SX(new))
+            for place, old, new in zip(_places(symbols.places.state), flatten(symbols.x), after, strict=True)
+            if new is not old
+        ]
     return Traced(
         name,
         f"One step of the task {task.name}.",
@@ -125,28 +181,32 @@ def _task(model: Model, symbols: _Symbols, task: Task) -> TracedTask:
 
 
 def _schedule(model: Model, symbols: _Symbols, tasks: Sequence[Task]) -> Traced:
-    answers = [
-        model.seed(symbols.p),
-        *[clock.period(symbols.k) for clock in model.clocks],
-        *[task.every(symbols.k) for task in tasks],
-        *[0.0 if task.choice is None else task.choice(symbols.p) for task in tasks],
-    ]
+    with _told(model, "seed, clocks and tasks"):
+        answers = _scalars(
+            [
+                model.seed(symbols.p),
+                *[clock.period(symbols.k) for clock in model.clocks],
+                *[task.every(symbols.k) for task in tasks],
+                *[0.0 if task.choice is None else task.choice(symbols.p) for task in tasks],
+            ]
+        )
     return Traced(
         "schedule",
         "Seed, periods of the clocks, dividers and choices of the tasks.",
         (symbols.v, casadi.SX(0, 1)),
-        _scalars(answers),
+        answers,
         tuple(range(len(answers))),
     )
 
 
 def _limits(model: Model, symbols: _Symbols) -> Traced:
-    bounds = [bound for rule in model.rules for bound in rule.limits(symbols.p)]
+    with _told(model, "rules"):
+        bounds = _scalars(bound for rule in model.rules for bound in rule.limits(symbols.p))
     return Traced(
         "limits",
         "Limits of parameters that follow from other parameters: low and high of each rule.",
         (symbols.v, casadi.SX(0, 1)),
-        _scalars(bounds),
+        bounds,
         tuple(range(len(bounds))),
     )
 
@@ -202,29 +262,41 @@ def _check_clocks(
             )
 
 
+def _by_clock(model: Model) -> list[Task]:
+    """The tasks in the order of their clocks."""
+    order = [clock.name for clock in model.clocks]
+    for task in model.tasks:
+        if task.clock not in order:
+            raise BuildError(
+                f"{model.name}: task {task.name} runs at a clock {task.clock!r}, which is not there "
+                f"(clocks: {', '.join(order)})"
+            )
+    return sorted(model.tasks, key=lambda task: order.index(task.clock))
+
+
 def trace(model: Model) -> Trace:
     """Call every function of ``model`` with symbols.
 
-    Raises `BuildError` if a tunable parameter moves a clock.
+    Raises `BuildError` for a function that cannot be traced or returns the wrong record, a task at an unknown clock,
+    and a tunable parameter that moves a clock.
     """
     interface = interface_of(model)
     symbols = _Symbols(model, interface)
     v, p, u, k, x = symbols.v, symbols.p, symbols.u, symbols.k, symbols.x
     none = casadi.SX(0, 1)
-    order = [clock.name for clock in model.clocks]
-    tasks = sorted(model.tasks, key=lambda task: order.index(task.clock))
+    tasks = _by_clock(model)
 
-    def traced(name: str, purpose: str, values: Any, place: slice) -> Traced:
-        return Traced(name, purpose, (v, none), _scalars(flatten(values)), _places(place))
+    def traced(name: str, purpose: str, record: type, place: slice, *arguments: Any) -> Traced:
+        with _told(model, name):
+            values = _scalars(_filled(model, name, record, getattr(model, name)(*arguments)))
+        return Traced(name, purpose, (v, none), values, _places(place))
 
     with _as_written():
         coefficients = traced(
-            "coefficients", "What follows from the parameters.", model.coefficients(p), interface.coefficients
+            "coefficients", "What follows from the parameters.", model.Coefficients, interface.coefficients, p
         )
-        initial_state = traced(
-            "initial_state", "The state at the start time.", model.initial_state(p, k, u), interface.state
-        )
-        outputs = traced("outputs", "What the model shows.", model.outputs(x, p, k), interface.outputs)
+        initial_state = traced("initial_state", "The state at the start time.", model.State, interface.state, p, k, u)
+        outputs = traced("outputs", "What the model shows.", model.Outputs, interface.outputs, x, p, k)
         schedule = _schedule(model, symbols, tasks)
         limits = _limits(model, symbols)
         steps = tuple(_task(model, symbols, task) for task in tasks)

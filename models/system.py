@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import inf, isfinite
 from typing import Any, NamedTuple
 
-from .errors import ModelStoppedError, ValueRefusedError
+from .errors import ModelStoppedError, ValueRefusedError, digits
 from .noise import normals, stream_of
 from .record import allowed_range, check, flatten, leaves, unflatten
 
@@ -27,6 +27,8 @@ LATEST_TIME = 1e9
 
 STOPPED = 1e12
 """Period of a clock that stands still, s."""
+
+_SEEDS = 2**64 - 1
 
 Step = Callable[[Any, Any, Any, Any, tuple[Any, ...]], Any]
 
@@ -130,6 +132,19 @@ class _Scheduled(NamedTuple):
     key: tuple[int, int]
 
 
+def _check_finite(record: type, value: Any, prefix: str) -> None:
+    """Raise `ModelStoppedError` where one of a record's numbers is none; `prefix` goes before its name."""
+    scalars = flatten(value)
+    if isfinite(sum(scalars)):
+        return
+    for leaf, scalar in zip(leaves(record), scalars, strict=True):
+        if not isfinite(scalar):
+            raise ModelStoppedError(
+                f"{prefix}{leaf.name} = {digits(scalar)}: the numbers ran away; "
+                "look for parameters or inputs far from what the model is made for"
+            )
+
+
 class Snapshot(NamedTuple):
     """All that evolves in a `Run`: the state's scalars and the clocks' counters."""
 
@@ -157,6 +172,7 @@ class Run:
             self.state = model.initial_state(parameters, self.coefficients, inputs)
         except (ArithmeticError, ValueError) as error:
             raise ModelStoppedError(f"{self.name}: no initial state: {error}") from error
+        _check_finite(model.State, self.state, f"{self.name}.state.")
 
     def _period(self, clock: Clock) -> float:
         period = float(clock.period(self.coefficients))
@@ -177,10 +193,11 @@ class Run:
             self.coefficients = self.model.coefficients(parameters)
         except (ArithmeticError, ValueError) as error:
             raise ModelStoppedError(f"{self.name}: no coefficients from these parameters: {error}") from error
+        _check_finite(self.model.Coefficients, self.coefficients, f"{self.name}.coefficient.")
         self.parameters = parameters
 
     def _schedule(self) -> None:
-        seed = int(self.model.seed(self.parameters))
+        seed = int(self.model.seed(self.parameters)) & _SEEDS
         self._due = [
             self.start_time + (count + 1) * period for count, period in zip(self.counts, self._periods, strict=True)
         ]
@@ -223,6 +240,7 @@ class Run:
             self.state = state
             counts[clock] = count
             due[clock] = self.start_time + (count + 1) * self._periods[clock]
+        _check_finite(self.model.State, self.state, f"{self.name}.state.")
 
     def outputs(self) -> Any:
         """What the model shows now."""
@@ -230,15 +248,9 @@ class Run:
 
     def shown(self) -> list[Any]:
         """The scalars of `outputs`; raises `ModelStoppedError` where one is no finite number."""
-        scalars = flatten(self.outputs())
-        if not isfinite(sum(scalars)):
-            for leaf, value in zip(leaves(self.model.Outputs), scalars, strict=True):
-                if not isfinite(value):
-                    raise ModelStoppedError(
-                        f"{self.name}.{leaf.name} = {value}: the numbers ran away; "
-                        "look for parameters or inputs far from what the model is made for"
-                    )
-        return scalars
+        outputs = self.outputs()
+        _check_finite(self.model.Outputs, outputs, f"{self.name}.")
+        return flatten(outputs)
 
     def snapshot(self) -> Snapshot:
         """A copy of all that evolves."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Iterator
 
@@ -14,7 +13,7 @@ from ...models.system import LATEST_TIME, SHORTEST_PERIOD, TIME_TOLERANCE
 from ..errors import BuildError
 from ..interface import Interface, Variable
 from ..ports import limits_of
-from ..saved_state import STAGES, TIME_SLACK
+from ..saved_state import STAGE_NAMES, STAGES, TIME_ROUNDING, TIME_SLACK
 from ..trace import Trace, Traced
 
 _OPERATIONS = {
@@ -64,8 +63,9 @@ def number(value: float) -> str:
 
 
 def text(value: str) -> str:
-    """A string literal."""
-    return json.dumps(value, ensure_ascii=False)
+    """A string literal: octal escapes for control characters, no trigraphs."""
+    escapes = {'"': '\\"', "\\": "\\\\", "?": "\\?"}
+    return '"' + "".join(f"\\{ord(c):03o}" if ord(c) < 32 else escapes.get(c, c) for c in value) + '"'
 
 
 def _body(
@@ -188,6 +188,7 @@ def _sizes(trace: Trace) -> Iterator[str]:
     yield f"    RULES = {len(trace.model.rules)},"
     yield f"    MOST_NORMALS = {max((task.task.normals for task in trace.tasks), default=0)}"
     yield from ("};", "")
+    yield from (f"typedef enum {{ {', '.join(STAGE_NAMES)} }} Stage;", "")
 
 
 def _constants(guid: str, fingerprint: str) -> Iterator[str]:
@@ -196,6 +197,7 @@ def _constants(guid: str, fingerprint: str) -> Iterator[str]:
     yield f"#define FINGERPRINT_1 0x{fingerprint[16:32]}u"
     yield f"#define TIME_TOLERANCE {number(TIME_TOLERANCE)}"
     yield f"#define TIME_SLACK {number(TIME_SLACK)}"
+    yield f"#define TIME_ROUNDING {number(TIME_ROUNDING)}"
     yield f"#define SHORTEST_PERIOD {number(SHORTEST_PERIOD)}"
     yield f"#define LATEST_TIME {number(LATEST_TIME)}"
     yield ""
@@ -205,7 +207,7 @@ def model_source(trace: Trace, guid: str, fingerprint: str) -> str:
     """The text of model.c."""
     interface = trace.interface
     lines: list[str] = [
-        f"/* {trace.model.name}: {trace.model.description}.",
+        f"/* {trace.model.name}: {trace.model.description}.".replace("*/", "* /"),
         "",
         "   Written by attitude-fmu from the model's Python source; v[i] is the variable with value reference i. */",
         "",

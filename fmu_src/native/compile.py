@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib.util
 import os
 import platform
-import shutil
 import struct
 import subprocess
 import sys
@@ -21,7 +20,7 @@ from typing import NamedTuple
 
 from ..errors import BuildError
 
-_OPTIONS = ("-std=c99", "-O2", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=undefined", "-shared")
+_OPTIONS = ("-std=c11", "-O2", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=undefined", "-shared")
 _POSIX_OPTIONS = ("-fPIC", "-fvisibility=hidden")
 
 
@@ -73,6 +72,29 @@ def compiler() -> list[str]:
     return [sys.executable, "-m", "ziglang", "cc"]
 
 
+_MISLEADING = ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "SDKROOT")
+"""Variables that would let other headers and libraries in, and so other bytes."""
+
+
+def _can_write(folder: Path) -> bool:
+    """Whether a folder, made where it is missing, can be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
+
+
+def _environment(cache: Path) -> dict[str, str]:
+    """What the compiler runs in; what it keeps for later lies in the user's cache, or in `cache` if that cannot be."""
+    environment = {name: value for name, value in os.environ.items() if name not in _MISLEADING}
+    environment["ZIG_LOCAL_CACHE_DIR"] = str(cache)
+    kept = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    if os.name == "posix" and "ZIG_GLOBAL_CACHE_DIR" not in os.environ and not _can_write(Path(kept)):
+        environment["ZIG_GLOBAL_CACHE_DIR"] = str(cache)
+    return environment
+
+
 def _compiled(folder: Path, target: str) -> bytes:
     library = folder / f"{target}.library"
     is_windows, is_apple = "windows" in target, "macos" in target
@@ -82,9 +104,10 @@ def _compiled(folder: Path, target: str) -> bytes:
         [*compiler(), "-target", target, *options, "-I", str(headers()), "fmu.c", "-lm", "-o", library.name],
         cwd=folder,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
+        errors="replace",
         check=False,
-        env={**os.environ, "ZIG_LOCAL_CACHE_DIR": str(folder / "cache")},
+        env=_environment(folder / "cache"),
     )
     if done.returncode != 0:
         raise BuildError(f"the C code could not be compiled for {target}:\n{done.stderr.strip()}")
@@ -118,7 +141,6 @@ def compile_all(sources: dict[str, bytes], platforms: Sequence[Platform]) -> dic
             (folder / source).write_bytes(content)
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             compiled = dict(zip(targets, pool.map(lambda target: _compiled(folder, target), targets), strict=True))
-        shutil.rmtree(folder / "cache", ignore_errors=True)
     return {
         wanted.folder: compiled[wanted.targets[0]]
         if len(wanted.targets) == 1

@@ -43,9 +43,12 @@ class LuGre(NamedTuple):
 def lugre(friction: Friction, inertia: Scalar) -> LuGre:
     """sigma0 = Tc / z_s, sigma1 = 2 zeta sqrt(sigma0 J) for a joint that turns the inertia J (kg.m2)."""
     stiffness = friction.coulomb / friction.presliding
+    product = stiffness * inertia
+    # the root's slope at zero is infinite: without friction there is nothing to differentiate
+    root = where(product > 0.0, sqrt(where(product > 0.0, product, 1.0)), 0.0)
     return LuGre(
         stiffness=stiffness,
-        damping=2.0 * friction.damping_ratio * sqrt(stiffness * inertia),
+        damping=2.0 * friction.damping_ratio * root,
         viscous=friction.viscous,
         coulomb=friction.coulomb,
         extra=(friction.static_ratio - 1.0) * friction.coulomb,

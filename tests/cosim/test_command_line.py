@@ -85,8 +85,8 @@ def test_default_scenario_end_to_end(dist: Path, tmp_path: Path) -> None:
 
 def test_written_system_and_parameters_give_the_same_run(dist: Path, tmp_path: Path) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
-    common = ("--stop", "0.3", "--step", "0.01", "--dist", str(dist))
-    done = run("run", "static", *common, "--out", str(first), "--set", "sensor.filter.kind=kalman")
+    common = ("--stop", "0.3", "--step", "0.01")
+    done = run("run", "static", *common, "--dist", str(dist), "--out", str(first), "--set", "sensor.filter.kind=kalman")
     assert done.exit_code == 0, done.stderr
     with open_ssp(first / "system.ssp") as back:
         values = {str(port): value for port, value in start_values(back, check(back)).items()}
@@ -159,6 +159,13 @@ def test_both_kinds_give_the_same_run_and_the_written_system_carries_the_one_tha
         (("info", "none.fmu"), 1, "FMU not found: none.fmu"),
         (("run", "static", "--fmu", "fortran"), 2, "'fortran' is not one of"),
         (("run", "mine.ssp", "--fmu", "python"), 2, "--fmu python: mine.ssp is taken as it is"),
+        (("run", "mine.ssp", "--dist", "d"), 2, "--dist d: mine.ssp is taken as it is; the option is for scenarios"),
+        (("info", "mine.fmu", "--dist", "d"), 2, "--dist d: mine.fmu is taken as it is; the option is for scenarios"),
+        (
+            ("run", "gimbal", "--set", "sensor.temperature=300"),
+            1,
+            "plant.temperature is connected to it; set plant.ambient_temperature",
+        ),
         (("build", "--platform", "amiga"), 2, "'amiga' is not one of"),
     ],
 )
@@ -166,7 +173,8 @@ def test_wrong_request_is_one_clear_line(
     dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], code: int, message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    extra = () if "--dist" in arguments else ("--dist", str(dist))
+    is_file = any(argument.endswith((".ssp", ".fmu")) for argument in arguments)
+    extra = () if "--dist" in arguments or is_file else ("--dist", str(dist))
     done = run(*arguments, *extra)
     assert done.exit_code == code
     assert message in " ".join(done.stderr.split())
@@ -282,6 +290,58 @@ def test_own_ssp_gets_summary_table_picture_and_all_outputs(fmus: dict[str, Path
     assert (tmp_path / "o" / "overview.png").is_file()
 
 
+def test_second_run_into_a_folder_is_refused_and_the_first_one_goes_on(fmus: dict[str, Path], tmp_path: Path) -> None:
+    path = write_ssp(System("t", (Component("ramp", fmus["integrator"]),), stop_time=1e4), tmp_path / "t.ssp")
+    out = tmp_path / "out"
+    options = ["run", str(path), "--step", "0.01", "--interval", "1", "--out", str(out)]
+    command = [sys.executable, "-c", HEARING_CTRL_C, *options]
+    spill = out / "results.partial.npy"
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        try:
+            wait_for(spill)
+            before = spill.stat().st_ino, spill.stat().st_size
+            done = run(*options, "--stop", "1")
+            assert done.exit_code == 1
+            assert done.stderr == (
+                f"attitude-fmu: another run is writing into {out}; let it end, or choose another place\n"
+            )
+            assert (spill.stat().st_ino, spill.stat().st_size) == before
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    # a run that was killed keeps nobody out
+    assert spill.is_file()
+    assert run(*options, "--stop", "1").exit_code == 0
+    assert not [file for file in out.iterdir() if file.name.startswith(".") and file.is_file()]
+    assert read_csv(out / "results.csv")["time"][-1] == 1.0
+
+
+def test_run_whose_master_was_killed_still_owns_its_results(fmus: dict[str, Path], tmp_path: Path) -> None:
+    motor = System("t", (Component("motor", fmus["troublemaker"]),), stop_time=1.0)
+    path = write_ssp(motor.with_values("hang", {"motor.way": 5}), tmp_path / "t.ssp")
+    out = tmp_path / "out"
+    options = ["run", str(path), "--step", "0.1", "--out", str(out)]
+    command = [sys.executable, "-c", HEARING_CTRL_C, *options]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True) as process:
+        try:
+            wait_for(out / "results.partial.npy")
+            process.kill()
+            process.wait()
+            done = run(*options, "--set", "motor.way=0")
+            assert done.exit_code == 1
+            assert f"another run is writing into {out / 'results.csv'}" in done.stderr
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+def wait_for(path: Path) -> None:
+    for _ in range(300):
+        if path.is_file():
+            break
+        time.sleep(0.1)
+
+
 def test_ctrl_c_says_so_and_keeps_the_results(dist: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-c", HEARING_CTRL_C, "run", "static", "--stop", "1000"]
     options = ["--out", str(tmp_path), "--dist", str(dist), "--interval", "0.1"]
@@ -292,10 +352,7 @@ def test_ctrl_c_says_so_and_keeps_the_results(dist: Path, tmp_path: Path) -> Non
         start_new_session=True,
     ) as process:
         spill = tmp_path / "results.partial.npy"
-        for _ in range(300):
-            if spill.is_file():
-                break
-            time.sleep(0.1)
+        wait_for(spill)
         time.sleep(1.0)
         try:
             # as a terminal does: to the whole group
@@ -370,6 +427,9 @@ def test_version_and_help(dist: Path) -> None:
     shown = run("info", "gimbal", "--dist", str(dist), "--pattern", "wind").stdout
     assert "plant.wind.speed = 10 m/s  (0 to 60 m/s)" in shown
     assert "mean speed at the camera" in shown
+    assert run("info", "gimbal", "--dist", str(dist), "--pattern", "PLANT*speed").stdout.splitlines()[1:2] == [
+        "  plant.wind.speed = 10 m/s  (0 to 60 m/s)"
+    ]
     assert "plant.rate[1] -> sensor.rate[1]" in run("info", "gimbal", "--dist", str(dist), "--all").stdout
 
 

@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -116,7 +117,8 @@ def test_children_leave_ctrl_c_to_their_parent_from_the_start(decay: System, tmp
         while not finished.wait(0.002):
             for child in multiprocessing.active_children():
                 if child.pid is not None:
-                    os.kill(child.pid, signal.SIGINT)
+                    with suppress(ProcessLookupError):
+                        os.kill(child.pid, signal.SIGINT)
                     hit.add(child.pid)
 
     thread = threading.Thread(target=press)

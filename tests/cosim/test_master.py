@@ -4,6 +4,7 @@ import errno
 import math
 import os
 import signal
+import subprocess
 import sys
 import tempfile
 import threading
@@ -19,8 +20,9 @@ from attitude_fmu.cosim.errors import ResultsError, RunStoppedError, SystemRefus
 from attitude_fmu.cosim.master import Order, simulate
 from attitude_fmu.cosim.recording import Recording, read_csv, read_rows, rescue, write_csv
 from attitude_fmu.cosim.slave import Slave
+from attitude_fmu.cosim.ssp import open_ssp, write_ssp
 from attitude_fmu.cosim.system import Component, System, connect
-from attitude_fmu.cosim.workspace import whole_or_not
+from attitude_fmu.cosim.workspace import claimed, whole_or_not
 
 JACOBI: Order = "jacobi"
 GAUSS_SEIDEL: Order = "gauss-seidel"
@@ -325,10 +327,55 @@ def test_full_disk_shows_before_the_run(tmp_path: Path, monkeypatch: pytest.Monk
 
     monkeypatch.setattr(os, "posix_fallocate", full)
     path = tmp_path / "r.partial.npy"
-    with pytest.raises(ResultsError, match=r"cannot keep 0\.8 MB of results in .*No space left"):
+    with pytest.raises(
+        ResultsError, match=r"cannot keep 10000 rows of 80 bytes \(0\.8 MB\) in .*No space left.*--interval"
+    ):
         Recording(np.dtype([("time", "f8"), ("y", "f8", 9)]), 10_000, path)
     assert asked[0] > 800_000
     assert not path.exists()
+
+
+def test_more_rows_than_memory_holds_are_refused() -> None:
+    with pytest.raises(
+        ResultsError, match=r"cannot keep 10{13} rows of 8 bytes .* in memory; .*\(--interval\) makes fewer"
+    ):
+        Recording(np.dtype([("time", "f8")]), 10**13)
+
+
+def test_paths_may_be_text_and_one_pattern_may_stand_alone(fmus: dict[str, Path], tmp_path: Path) -> None:
+    system = System("s", (Component("ramp", str(fmus["integrator"])),), stop_time=0.2)
+    path = str(tmp_path / "r.csv")
+    results = simulate(system, step=0.1, record="ramp.x", results=path, workspace=str(tmp_path)).results
+    assert results.dtype.names == ("time", "ramp.x")
+    assert (read_csv(write_csv(path, read_csv(path))) == results).all()
+    with open_ssp(str(write_ssp(system, str(tmp_path / "s.ssp")))) as same:
+        assert same.stop_time == 0.2
+
+
+CLAIMING = """
+import sys, time
+from pathlib import Path
+from attitude_fmu.cosim.workspace import claimed
+with claimed(Path(sys.argv[1])):
+    print("claimed", flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("name", ["r.csv", ""])
+def test_what_another_process_writes_is_refused_until_it_is_gone(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    with subprocess.Popen([sys.executable, "-c", CLAIMING, str(path)], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "claimed\n"
+            with pytest.raises(ResultsError, match="another run is writing into"), claimed(path):
+                pass
+        finally:
+            process.kill()
+    with claimed(path), pytest.raises(ResultsError, match="another run is writing into"), claimed(path):
+        pass
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_refused_start_leaves_the_earlier_results(fmus: dict[str, Path], tmp_path: Path) -> None:
@@ -387,7 +434,7 @@ def test_folder_with_a_difficult_name_is_avoided(
 
 
 def test_unwritable_results_are_reported_before_the_run(decay: System, tmp_path: Path) -> None:
-    with pytest.raises(ResultsError, match="cannot keep"):
+    with pytest.raises(ResultsError, match="cannot write"):
         simulate(decay, step=0.1, results=tmp_path / "missing" / "r.csv")
 
 

@@ -103,6 +103,13 @@ def test_loop_that_was_not_aligned_is_told_briefly() -> None:
     assert "plant.euler" not in text
 
 
+def test_alignment_with_the_last_record_gives_no_errors() -> None:
+    numbers = report(results(duration=2.0), 1.0, ROLES, {})
+    assert numbers.errors == ()
+    assert "did not finish its alignment before the end" in " ".join(shown(numbers).split())
+    assert report(results(duration=2.001), 1.0, ROLES, {}).errors
+
+
 def test_too_short_for_an_exposure_gives_no_jitter() -> None:
     assert jitter(results(), "plant", 9.5) is None
 

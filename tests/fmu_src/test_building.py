@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -203,18 +204,35 @@ def test_the_reference_page_is_in_groups(fmu: Path) -> None:
     places = [
         page.index(text)
         for text in (
-            "<h2>Axes",
-            "<h2>Inputs",
-            "<h2>Outputs",
-            "<h2>Parameters",
+            ">Axes, signs and units</h2>",
+            ">Inputs</h2>",
+            ">Outputs</h2>",
+            ">Parameters</h2>",
             "<td>gain</td>",
-            "<h3>noise</h3>",
+            ">noise</h3>",
             "<td>noise.seed</td>",
-            "<h2>Calculated parameters",
-            "<h2>State",
+            ">Calculated parameters</h2>",
+            ">State</h2>",
         )
     ]
     assert places == sorted(places)
+
+
+def test_the_reference_page_begins_with_its_contents(fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        page = archive.read("documentation/index.html").decode()
+    links = re.findall(r'<a href="#([^"]+)">([^<]+)</a>', page)
+    assert page.rindex("<a href") < page.index("<h2")
+    assert [(name, text) for _, name, text in re.findall(r'<h([23]) id="([^"]+)">([^<]+)</h', page)] == links
+    assert {"Inputs", "Parameters", "noise"} <= {text for _, text in links}
+
+
+def test_the_reference_page_shows_start_values_in_display_units(fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert "<td>temperature</td><td>K (degC)</td><td>298.15 (25 degC)</td>" in page
+    assert "<td>gain</td><td>(%)</td><td>1 (100 %)</td>" in page.replace("<td> (", "<td>(")
+    assert "<td>rate[1]</td><td>rad/s (deg/s)</td><td>0</td>" in page
 
 
 def test_sources_in_the_fmu_import_nothing_of_the_installed_package(python_fmu: Path) -> None:
@@ -272,6 +290,37 @@ def test_the_command_names_what_it_could_not_build() -> None:
     done = subprocess.run([sys.executable, str(COMMAND), "Nothing"], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith("there is no FMU called Nothing; there are AttitudeSensor")
+
+
+def test_the_command_warns_when_it_builds_from_other_sources(tmp_path: Path) -> None:
+    command = shutil.copy(COMMAND, tmp_path)
+    done = subprocess.run([sys.executable, command, "Nothing"], capture_output=True, text=True, check=False)
+    warning, refusal = done.stderr.splitlines()
+    assert warning == f"warning: building from {COMMAND.parent}, not from {tmp_path}: pip install -e . there"
+    assert refusal.startswith("there is no FMU called Nothing")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (None, "there is no module wrong_model"),
+        ("1 / 0", "module wrong_model: ZeroDivisionError: division by zero"),
+        ("\ndef (", "module wrong_model: line 2: invalid syntax"),
+        ("x = 1", "module wrong_model: AttributeError: module 'wrong_model' has no attribute 'MODEL'"),
+        ("MODEL = 3", "module wrong_model: its MODEL is no Model of attitude_fmu.models.system"),
+    ],
+)
+def test_a_module_that_is_no_model_is_told_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str | None, told: str
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    if text is not None:
+        (tmp_path / "wrong_model.py").write_text(text)
+    with pytest.raises(BuildError) as caught:
+        build(Entry("Wrong", "wrong_model"), tmp_path / "dist")
+    assert str(caught.value).startswith("Wrong could not be built: ")
+    assert str(caught.value).endswith(told)
+    assert "\n" not in str(caught.value)
 
 
 def test_only_stale_fmus_are_built(tmp_path: Path) -> None:

@@ -330,7 +330,7 @@ def test_a_state_of_another_version_is_refused(unit: Instance) -> None:
     data[unit.differs.fingerprint_at] ^= 0xFF
     end = struct.calcsize(unit.differs.checksum)
     data[-end:] = struct.pack(unit.differs.checksum, zlib.crc32(data[:-end]))
-    reason = unit.refusal(lambda: unit.restore(bytes(data)), by="fmi2SetFMUstate")
+    reason = unit.refusal(lambda: unit.restore(bytes(data)), by=unit.differs.refuses_bytes)
     assert reason == "EveryKind: saved state refused: another FMU or version saved it"
     unit.step(start=5e-3)
 

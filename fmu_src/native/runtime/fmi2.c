@@ -11,9 +11,12 @@
        Get, GetDirectionalDerivative   x             x             x        x         x
        Terminate, Reset, states        x             x             x        x         x
 
-   More lenient than the standard in two points that do no harm: values can be read before initialisation, as some hosts
-   do, and fmi2Terminate is taken at any time, as hosts call it that clean up after an error. After fmi2Error an instance
-   goes on as if the call had not been made; only a step whose numbers ran away stops it. */
+   More lenient than the standard where it does no harm: values can be read before initialisation, as some hosts do;
+   fmi2Terminate is taken at any time, as hosts call it that clean up after an error; fmi2SetupExperiment may be left
+   out (the start time is 0) and a stop time passed (hosts overshoot by part of a step). After fmi2Error an instance goes
+   on as if the call had not been made; only a step whose numbers ran away stops it. */
+
+static const char NO_ARRAY[] = "%s: an array is missing (NULL)";
 
 static fmi2Status require(Instance *instance, const char *call, Stage from, Stage to)
 {
@@ -79,14 +82,18 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean on, size_t c
     int events = count == 0, errors = count == 0;
     if (!instance)
         return fmi2Error;
+    if (count && !categories)
+        return refuse(instance, NO_ARRAY, instance->name);
     for (size_t i = 0; i < count; i++) {
-        const int all = !strcmp(categories[i], "logAll");
-        if (all || !strcmp(categories[i], "logEvents"))
+        const char *category = categories[i] ? categories[i] : "(NULL)";
+        if (!strcmp(category, "logAll"))
+            events = errors = 1;
+        else if (!strcmp(category, "logEvents"))
             events = 1;
-        if (all || !strcmp(categories[i], "logStatusError"))
+        else if (!strcmp(category, "logStatusError"))
             errors = 1;
-        else if (!all && strcmp(categories[i], "logEvents"))
-            return refuse(instance, "%s: there is no log category %s", instance->name, categories[i]);
+        else
+            return refuse(instance, "%s: there is no log category %s", instance->name, category);
     }
     if (events)
         instance->logs_events = on;
@@ -106,8 +113,8 @@ fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean has_toleranc
     if (!instance || require(instance, "fmi2SetupExperiment", INSTANTIATED, INSTANTIATED) != fmi2OK)
         return fmi2Error;
     if (!(fabs(start_time) <= LATEST_TIME))
-        return refuse(instance, "%s: the start time is %.15g s (allowed: up to %.15g s)", instance->name, start_time,
-                      LATEST_TIME);
+        return refuse(instance, "%s: the start time is %s s (allowed: up to %s s)", instance->name,
+                      written(start_time).digits, written(LATEST_TIME).digits);
     instance->now.start_time = instance->now.time = start_time;
     instance->now.stale = EVERYTHING_STALE; /* the clocks' ticks count from the start time */
     return fmi2OK;
@@ -130,7 +137,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component component)
     if (refresh(instance, COEFFICIENTS_STALE | STATE_STALE) != fmi2OK)
         return fmi2Error;
     instance->now.stage = STEPPING;
-    log_event(instance, "%s: initialised at t = %.15g s", instance->name, instance->now.time);
+    log_event(instance, "%s: initialised at t = %s s", instance->name, written(instance->now.time).digits);
     return fmi2OK;
 }
 
@@ -140,7 +147,7 @@ fmi2Status fmi2Terminate(fmi2Component component)
     if (!instance)
         return fmi2Error;
     instance->now.stage = TERMINATED;
-    log_event(instance, "%s: terminated at t = %.15g s", instance->name, instance->now.time);
+    log_event(instance, "%s: terminated at t = %s s", instance->name, written(instance->now.time).digits);
     return fmi2OK;
 }
 
@@ -187,9 +194,12 @@ static int64_t group_of(fmi2ValueReference reference)
 }
 
 /* Check that these can be read, and calculate what has to be. */
-static fmi2Status ready(Instance *instance, const fmi2ValueReference references[], size_t count, Type type)
+static fmi2Status ready(Instance *instance, const fmi2ValueReference references[], size_t count, const void *values,
+                        Type type)
 {
     int64_t needs = 0;
+    if (count && (!references || !values))
+        return refuse(instance, NO_ARRAY, instance->name);
     for (size_t i = 0; i < count; i++) {
         if (find(instance, references[i], type) != fmi2OK)
             return fmi2Error;
@@ -201,7 +211,7 @@ static fmi2Status ready(Instance *instance, const fmi2ValueReference references[
 fmi2Status fmi2GetReal(fmi2Component component, const fmi2ValueReference references[], size_t count, fmi2Real values[])
 {
     Instance *instance = component;
-    if (!instance || ready(instance, references, count, REAL) != fmi2OK)
+    if (!instance || ready(instance, references, count, values, REAL) != fmi2OK)
         return fmi2Error;
     for (size_t i = 0; i < count; i++)
         values[i] = instance->now.v[references[i]];
@@ -212,13 +222,13 @@ fmi2Status fmi2GetInteger(fmi2Component component, const fmi2ValueReference refe
                           fmi2Integer values[])
 {
     Instance *instance = component;
-    if (!instance || ready(instance, references, count, INTEGER) != fmi2OK)
+    if (!instance || ready(instance, references, count, values, INTEGER) != fmi2OK)
         return fmi2Error;
     for (size_t i = 0; i < count; i++) {
         const double value = instance->now.v[references[i]];
-        if (!(fabs(value) <= 2147483647.0))
-            return refuse(instance, "%s.%s = %g does not fit into an integer", instance->name,
-                          VARIABLE[references[i]].name, value);
+        if (!is_int32(value))
+            return refuse(instance, "%s.%s = %s does not fit into an integer", instance->name,
+                          VARIABLE[references[i]].name, written(value).digits);
         values[i] = (fmi2Integer)value;
     }
     return fmi2OK;
@@ -228,7 +238,7 @@ fmi2Status fmi2GetBoolean(fmi2Component component, const fmi2ValueReference refe
                           fmi2Boolean values[])
 {
     Instance *instance = component;
-    if (!instance || ready(instance, references, count, BOOLEAN) != fmi2OK)
+    if (!instance || ready(instance, references, count, values, BOOLEAN) != fmi2OK)
         return fmi2Error;
     for (size_t i = 0; i < count; i++)
         values[i] = instance->now.v[references[i]] != 0.0;
@@ -243,6 +253,8 @@ fmi2Status fmi2GetString(fmi2Component component, const fmi2ValueReference refer
         return fmi2Error;
     if (count == 0)
         return fmi2OK;
+    if (!references)
+        return refuse(instance, NO_ARRAY, instance->name);
     if (!exists(references[0]))
         return refuse(instance, NO_VARIABLE, instance->name, references[0]);
     return refuse(instance, OTHER_TYPE, instance->name, VARIABLE[references[0]].name,
@@ -296,38 +308,57 @@ static void store(Instance *instance, fmi2ValueReference reference, double value
         instance->now.stale |= COEFFICIENTS_STALE | OUTPUTS_STALE;
 }
 
+/* The i-th of the values that a host sets. */
+typedef double Element(const void *values, size_t i);
+
+static double real_at(const void *values, size_t i) { return ((const fmi2Real *)values)[i]; }
+static double integer_at(const void *values, size_t i) { return ((const fmi2Integer *)values)[i]; }
+static double boolean_at(const void *values, size_t i) { return ((const fmi2Boolean *)values)[i] ? 1.0 : 0.0; }
+
 /* Nothing is stored unless everything may be; of several faults, that one is told which the Python kind tells. */
-#define SET(TYPE, KIND, CONVERTED)                                                                                         \
-    fmi2Status fmi2Set##TYPE(fmi2Component component, const fmi2ValueReference references[], size_t count,                 \
-                             const fmi2##TYPE values[])                                                                    \
-    {                                                                                                                      \
-        if (!component)                                                                                                    \
-            return fmi2Error;                                                                                              \
-        for (size_t i = 0; i < count; i++)                                                                                 \
-            if (find(component, references[i], KIND) != fmi2OK)                                                            \
-                return fmi2Error;                                                                                          \
-        for (size_t i = 0; i < count; i++)                                                                                 \
-            if (check_causality(component, references[i]) != fmi2OK)                                                       \
-                return fmi2Error;                                                                                          \
-        for (size_t i = 0; i < count; i++)                                                                                 \
-            if (check_value(component, references[i], CONVERTED(values[i])) != fmi2OK)                                     \
-                return fmi2Error;                                                                                          \
-        if (require(component, "setting values", INSTANTIATED, STEPPING) != fmi2OK)                                        \
-            return fmi2Error;                                                                                              \
-        for (size_t i = 0; i < count; i++)                                                                                 \
-            if (check_variability(component, references[i], CONVERTED(values[i])) != fmi2OK)                               \
-                return fmi2Error;                                                                                          \
-        for (size_t i = 0; i < count; i++)                                                                                 \
-            store(component, references[i], CONVERTED(values[i]));                                                         \
-        return fmi2OK;                                                                                                     \
-    }
+static fmi2Status set(Instance *instance, const fmi2ValueReference references[], size_t count, const void *values,
+                      Type type, Element *at)
+{
+    if (!instance)
+        return fmi2Error;
+    if (count && (!references || !values))
+        return refuse(instance, NO_ARRAY, instance->name);
+    for (size_t i = 0; i < count; i++)
+        if (find(instance, references[i], type) != fmi2OK)
+            return fmi2Error;
+    for (size_t i = 0; i < count; i++)
+        if (check_causality(instance, references[i]) != fmi2OK)
+            return fmi2Error;
+    for (size_t i = 0; i < count; i++)
+        if (check_value(instance, references[i], at(values, i)) != fmi2OK)
+            return fmi2Error;
+    if (require(instance, "setting values", INSTANTIATED, STEPPING) != fmi2OK)
+        return fmi2Error;
+    for (size_t i = 0; i < count; i++)
+        if (check_variability(instance, references[i], at(values, i)) != fmi2OK)
+            return fmi2Error;
+    for (size_t i = 0; i < count; i++)
+        store(instance, references[i], at(values, i));
+    return fmi2OK;
+}
 
-static double as_number(double value) { return value; }
-static double as_switch(fmi2Boolean value) { return value ? 1.0 : 0.0; }
+fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference references[], size_t count,
+                       const fmi2Real values[])
+{
+    return set(component, references, count, values, REAL, real_at);
+}
 
-SET(Real, REAL, as_number)
-SET(Integer, INTEGER, as_number)
-SET(Boolean, BOOLEAN, as_switch)
+fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference references[], size_t count,
+                          const fmi2Integer values[])
+{
+    return set(component, references, count, values, INTEGER, integer_at);
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component component, const fmi2ValueReference references[], size_t count,
+                          const fmi2Boolean values[])
+{
+    return set(component, references, count, values, BOOLEAN, boolean_at);
+}
 
 fmi2Status fmi2SetString(fmi2Component component, const fmi2ValueReference references[], size_t count,
                          const fmi2String values[])
@@ -359,7 +390,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate state)
     fault = restore(instance, state);
     if (fault)
         return refuse(instance, "%s: saved state refused: %s", instance->name, fault);
-    log_event(instance, "%s: state restored, t = %.15g s", instance->name, instance->now.time);
+    log_event(instance, "%s: state restored, t = %s s", instance->name, written(instance->now.time).digits);
     return fmi2OK;
 }
 
@@ -399,8 +430,9 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate state, fm
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
 {
     Instance *instance = component;
-    SavedState *saved;
+    SavedState *saved, head;
     uint64_t checksum;
+    const char *fault;
     if (!instance || !state)
         return fmi2Error;
     if (!bytes || size != sizeof *saved + sizeof checksum)
@@ -409,10 +441,14 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte bytes
     memcpy(&checksum, bytes + sizeof *saved, sizeof checksum);
     if (checksum != checksum_of((const unsigned char *)bytes, sizeof *saved))
         return refuse(instance, "%s: saved state refused: the bytes are damaged (checksum)", instance->name);
+    memcpy(&head, bytes, sizeof head);
+    fault = foreignness(&head);
+    if (fault)
+        return refuse(instance, "%s: saved state refused: %s", instance->name, fault);
     saved = *state ? *state : malloc(sizeof *saved);
     if (!saved)
         return refuse(instance, "%s: no memory for the saved state", instance->name);
-    memcpy(saved, bytes, sizeof *saved);
+    *saved = head;
     *state = saved;
     return fmi2OK;
 }
@@ -450,13 +486,15 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2Value
     double tangent[VARIABLES] = {0};
     if (!instance)
         return fmi2Error;
+    if ((unknown_count && (!unknowns || !derivatives)) || (known_count && (!knowns || !seeds)))
+        return refuse(instance, NO_ARRAY, instance->name);
     for (size_t i = 0; i < unknown_count; i++)
         if (check_unknown(instance, unknowns[i]) != fmi2OK)
             return fmi2Error;
     for (size_t i = 0; i < known_count; i++) {
         if (check_known(instance, knowns[i]) != fmi2OK)
             return fmi2Error;
-        tangent[knowns[i]] = seeds[i];
+        tangent[knowns[i]] += seeds[i];
     }
     if (refresh(instance, EVERYTHING_STALE) != fmi2OK)
         return fmi2Error;
@@ -464,6 +502,10 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2Value
     if (instance->now.stage < STEPPING)
         initial_state_derivative(instance->now.v, tangent);
     outputs_derivative(instance->now.v, tangent);
+    for (size_t i = 0; i < unknown_count; i++)
+        if (!isfinite(tangent[unknowns[i]]))
+            return refuse(instance, "%s: the derivative of %s is %s here", instance->name, VARIABLE[unknowns[i]].name,
+                          written(tangent[unknowns[i]]).digits);
     for (size_t i = 0; i < unknown_count; i++)
         derivatives[i] = tangent[unknowns[i]];
     return fmi2OK;
@@ -476,6 +518,8 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
     Instance *instance = component;
     if (!instance || require(instance, "setting input derivatives", INSTANTIATED, STEPPING) != fmi2OK)
         return fmi2Error;
+    if (count && (!references || !orders || !values))
+        return refuse(instance, NO_ARRAY, instance->name);
     for (size_t i = 0; i < count; i++) {
         if (find(instance, references[i], REAL) != fmi2OK)
             return fmi2Error;
@@ -485,8 +529,8 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
             return refuse(instance, "%s: derivative of order %d of %s refused: only the first is used", instance->name,
                           orders[i], VARIABLE[references[i]].name);
         if (!isfinite(values[i]))
-            return refuse(instance, "%s: the derivative of %s is %g", instance->name, VARIABLE[references[i]].name,
-                          values[i]);
+            return refuse(instance, "%s: the derivative of %s is %s", instance->name, VARIABLE[references[i]].name,
+                          written(values[i]).digits);
     }
     for (size_t i = 0; i < count; i++) {
         instance->now.slope[references[i] - INPUTS_AT] = values[i];
@@ -507,6 +551,17 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component component, const fmi2Value
     return count ? refuse(component, "%s: derivatives of outputs are not offered", ((Instance *)component)->name) : fmi2OK;
 }
 
+/* Whether inputs that follow a slope stay in their range until the end of a step. */
+static fmi2Status check_slopes(Instance *instance, double size)
+{
+    for (int i = 0; instance->now.is_sloped && i < INPUTS; i++) {
+        const double end = instance->now.v[INPUTS_AT + i] + instance->now.slope[i] * size;
+        if (instance->now.slope[i] != 0.0 && check_value(instance, (unsigned)(INPUTS_AT + i), end) != fmi2OK)
+            return fmi2Error;
+    }
+    return fmi2OK;
+}
+
 /* --- steps -------------------------------------------------------------------------------------------------------- */
 
 fmi2Status fmi2DoStep(fmi2Component component, fmi2Real time, fmi2Real size, fmi2Boolean no_return)
@@ -516,12 +571,12 @@ fmi2Status fmi2DoStep(fmi2Component component, fmi2Real time, fmi2Real size, fmi
     if (!instance || require(instance, "fmi2DoStep", STEPPING, STEPPING) != fmi2OK)
         return fmi2Error;
     if (!(size >= 0.0 && time + size <= LATEST_TIME))
-        return refuse(instance, "%s: a step of %.15g s from t = %.15g s (allowed: forwards, up to %.15g s)",
-                      instance->name, size, time, LATEST_TIME);
-    if (!(fabs(time - instance->now.time) <= TIME_SLACK * size + 1e-9))
-        return refuse(instance, "%s: a step from t = %.15g s, but the FMU stands at t = %.15g s", instance->name, time,
-                      instance->now.time);
-    if (refresh(instance, COEFFICIENTS_STALE) != fmi2OK)
+        return refuse(instance, "%s: a step of %s s from t = %s s (allowed: forwards, up to %s s)", instance->name,
+                      written(size).digits, written(time).digits, written(LATEST_TIME).digits);
+    if (!(fabs(time - instance->now.time) <= TIME_SLACK * fmin(size, 1.0) + TIME_ROUNDING))
+        return refuse(instance, "%s: a step from t = %s s, but the FMU stands at t = %s s", instance->name,
+                      written(time).digits, written(instance->now.time).digits);
+    if (check_slopes(instance, size) != fmi2OK || refresh(instance, COEFFICIENTS_STALE) != fmi2OK)
         return fmi2Error;
     return take_step(instance, time + size);
 }

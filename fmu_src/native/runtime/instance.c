@@ -1,8 +1,5 @@
 /* An instance, its log, and its scheduler: the twin of models/system.py. */
 
-/* In the order of fmu_src/saved_state.py. */
-typedef enum { INSTANTIATED, INITIALISING, STEPPING, STOPPED, TERMINATED } Stage;
-
 /* All that decides how an instance goes on; 8 bytes each, so that there is no padding. */
 typedef struct {
     double v[VARIABLES];
@@ -78,23 +75,37 @@ static fmi2Status refuse(Instance *instance, const char *format, ...)
 static const char *space(const char *unit) { return strcmp(unit, "1") ? " " : ""; }
 static const char *shown(const char *unit) { return strcmp(unit, "1") ? unit : ""; }
 
-/* A number as messages show it, the same on every platform. */
-static const char *written(double value, char digits[32])
+/* A number as messages show it, the same on every platform and in every locale. */
+typedef struct {
+    char digits[32];
+} Written;
+
+static Written written(double value)
 {
+    Written text;
     if (isnan(value))
-        return "nan";
-    if (isinf(value))
-        return value > 0.0 ? "inf" : "-inf";
-    snprintf(digits, 32, "%.15g", value);
-    return digits;
+        strcpy(text.digits, "nan");
+    else if (isinf(value))
+        strcpy(text.digits, value > 0.0 ? "inf" : "-inf");
+    else
+        snprintf(text.digits, sizeof text.digits, "%.15g", value);
+    for (char *c = text.digits; *c; c++)
+        if (*c == ',')
+            *c = '.';
+    return text;
+}
+
+/* Whether a number can be an FMI integer. */
+static int is_int32(double value)
+{
+    return value == floor(value) && -2147483648.0 <= value && value <= 2147483647.0;
 }
 
 static fmi2Status refuse_value(Instance *instance, unsigned reference, double value, const char *why)
 {
     const Settable *settable = &SETTABLE[reference];
-    char digits[32];
     return refuse(instance, "%s.%s = %s%s%s: %s (allowed: %s)", instance->name, VARIABLE[reference].name,
-                  written(value, digits), space(settable->unit), shown(settable->unit), why, settable->allowed);
+                  written(value).digits, space(settable->unit), shown(settable->unit), why, settable->allowed);
 }
 
 static int are_finite(const double *values, int count)
@@ -107,15 +118,25 @@ static int are_finite(const double *values, int count)
 
 static fmi2Status refuse_runaway(Instance *instance, int first, int count)
 {
-    char digits[32];
     int i = first;
     while (i < first + count - 1 && isfinite(instance->now.v[i]))
         i++;
     return refuse(instance, "%s.%s = %s: the numbers ran away; look for parameters or inputs far from what the model "
-                  "is made for", instance->name, VARIABLE[i].name, written(instance->now.v[i], digits));
+                  "is made for", instance->name, VARIABLE[i].name, written(instance->now.v[i]).digits);
 }
 
 /* --- parameters: rules, coefficients, clocks ---------------------------------------------------------------------- */
+
+/* "0 to 1 m", "0 m or more" or "1 m or less". */
+static void write_range(double low, double high, const char *unit, char *range, size_t size)
+{
+    if (high == HUGE_VAL)
+        snprintf(range, size, "%s%s%s or more", written(low).digits, space(unit), shown(unit));
+    else if (low == -HUGE_VAL)
+        snprintf(range, size, "%s%s%s or less", written(high).digits, space(unit), shown(unit));
+    else
+        snprintf(range, size, "%s to %s%s%s", written(low).digits, written(high).digits, space(unit), shown(unit));
+}
 
 static fmi2Status check_rules(Instance *instance)
 {
@@ -125,19 +146,12 @@ static fmi2Status check_rules(Instance *instance)
         const unsigned reference = RULE[i].parameter;
         const double value = instance->now.v[reference], low = limit[2 * i], high = limit[2 * i + 1];
         const char *unit = SETTABLE[reference].unit;
+        char range[160];
         if (low <= value && value <= high)
             continue;
-        if (high == HUGE_VAL)
-            return refuse(instance, "%s.%s = %.15g%s%s: %s (allowed: %.15g%s%s or more)", instance->name,
-                          VARIABLE[reference].name, value, space(unit), shown(unit), RULE[i].why, low, space(unit),
-                          shown(unit));
-        if (low == -HUGE_VAL)
-            return refuse(instance, "%s.%s = %.15g%s%s: %s (allowed: %.15g%s%s or less)", instance->name,
-                          VARIABLE[reference].name, value, space(unit), shown(unit), RULE[i].why, high, space(unit),
-                          shown(unit));
-        return refuse(instance, "%s.%s = %.15g%s%s: %s (allowed: %.15g to %.15g%s%s)", instance->name,
-                      VARIABLE[reference].name, value, space(unit), shown(unit), RULE[i].why, low, high, space(unit),
-                      shown(unit));
+        write_range(low, high, unit, range, sizeof range);
+        return refuse(instance, "%s.%s = %s%s%s: %s (allowed: %s)", instance->name, VARIABLE[reference].name,
+                      written(value).digits, space(unit), shown(unit), RULE[i].why, range);
     }
     return fmi2OK;
 }
@@ -158,7 +172,7 @@ static double due_time(const Instance *instance, int clock)
 /* Plan the tasks; the clocks' periods are those of the beginning. */
 static void plan(Instance *instance, const Schedule *found, int is_beginning)
 {
-    instance->seed = (uint64_t)found->seed;
+    instance->seed = (uint64_t)(int64_t)found->seed;
     for (int i = 0; i < TASKS; i++) {
         instance->every[i] = found->every[i] >= 1.0 ? (int64_t)fmin(found->every[i], 9007199254740992.0) : 1;
         instance->step[i] = chosen(&TASK[i], found->choice[i]);
@@ -183,8 +197,9 @@ static fmi2Status prepare(Instance *instance, int is_beginning)
     schedule(v, (double *)&found);
     for (int i = 0; i < CLOCKS; i++)
         if (!(found.period[i] >= SHORTEST_PERIOD))
-            return refuse(instance, "%s.%s clock's period = %.15g s: the parameters give too short a period "
-                          "(allowed: %.15g s or more)", instance->name, CLOCK[i].name, found.period[i], SHORTEST_PERIOD);
+            return refuse(instance, "%s.%s clock's period = %s s: the parameters give too short a period "
+                          "(allowed: %s s or more)", instance->name, CLOCK[i].name, written(found.period[i]).digits,
+                          written(SHORTEST_PERIOD).digits);
     plan(instance, &found, is_beginning);
     instance->now.stale &= ~COEFFICIENTS_STALE;
     return fmi2OK;
@@ -261,7 +276,8 @@ static void advance(Instance *instance, double until)
 
 static void forget_slopes(Instance *instance)
 {
-    memset(instance->now.slope, 0, sizeof instance->now.slope);
+    if (instance->now.is_sloped)
+        memset(instance->now.slope, 0, sizeof instance->now.slope);
     instance->now.is_sloped = 0;
 }
 
@@ -282,7 +298,7 @@ static fmi2Status take_step(Instance *instance, double until)
         return status;
     }
     forget_slopes(instance);
-    now->time = until;
+    now->time = fmax(until, now->time);
     now->stale |= OUTPUTS_STALE;
     return fmi2OK;
 }

@@ -1,6 +1,7 @@
 /* Saved states: a moment with a head that tells whose it is, and a checksum when it leaves as bytes.
 
-   Every field is 8 bytes long and little-endian, as all the platforms are that this is built for. */
+   Every field is 8 bytes long, in the machine's own order: all the platforms that this is built for have the same, and
+   another one's is refused by the first field. */
 
 typedef struct {
     uint64_t magic, fingerprint[2], size;
@@ -9,14 +10,19 @@ typedef struct {
 
 static const uint64_t MAGIC = 0x33554D46746E6F43u;
 
-/* CRC-32 of IEEE 802.3. */
+/* CRC-32 of IEEE 802.3, four bits at a time. */
 static uint32_t checksum_of(const unsigned char *bytes, size_t size)
 {
-    uint32_t crc = 0xFFFFFFFFu;
+    uint32_t table[16], crc = 0xFFFFFFFFu;
+    for (uint32_t i = 0; i < 16; i++) {
+        table[i] = i;
+        for (int bit = 0; bit < 4; bit++)
+            table[i] = table[i] >> 1 ^ (0xEDB88320u & (0u - (table[i] & 1u)));
+    }
     for (size_t i = 0; i < size; i++) {
         crc ^= bytes[i];
-        for (int bit = 0; bit < 8; bit++)
-            crc = crc >> 1 ^ (0xEDB88320u & (0u - (crc & 1u)));
+        crc = crc >> 4 ^ table[crc & 15u];
+        crc = crc >> 4 ^ table[crc & 15u];
     }
     return ~crc;
 }
@@ -35,11 +41,14 @@ static int fits(int reference, double value)
 {
     const Settable *settable = &SETTABLE[reference];
     return settable->low <= value && value <= settable->high &&
-           (VARIABLE[reference].type == REAL || (value == floor(value) && fabs(value) <= 2147483647.0));
+           (VARIABLE[reference].type == REAL || is_int32(value));
 }
 
 static int is_in_range(const Moment *moment)
 {
+    if (moment->stale & ~(int64_t)EVERYTHING_STALE || (moment->is_sloped != 0 && moment->is_sloped != 1) ||
+        (moment->stage >= STEPPING && moment->stage != TERMINATED && moment->stale & STATE_STALE))
+        return 0;
     for (int i = 0; i < OUTPUTS_AT; i++)
         if (!fits(i, moment->v[i]))
             return 0;
@@ -47,7 +56,8 @@ static int is_in_range(const Moment *moment)
         if (moment->ticks[i] < 0 || moment->ticks[i] > (int64_t)1 << 53)
             return 0;
     return INSTANTIATED <= moment->stage && moment->stage <= TERMINATED &&
-           (moment->stage < STEPPING ? moment->time == moment->start_time : are_finite(moment->v + STATE_AT, STATES)) &&
+           (moment->stage >= STEPPING || moment->time == moment->start_time) &&
+           (moment->stage < STEPPING || moment->stale & STATE_STALE || are_finite(moment->v + STATE_AT, STATES)) &&
            are_finite(moment->slope, INPUTS) && fabs(moment->start_time) <= LATEST_TIME &&
            fabs(moment->time) <= LATEST_TIME;
 }
@@ -65,15 +75,23 @@ static int find_schedule(Moment *moment, Schedule *found)
     return 1;
 }
 
+/* NULL if a saved state is one of this FMU, else what it is. */
+static const char *foreignness(const SavedState *saved)
+{
+    if (!saved || saved->magic != MAGIC)
+        return "this is no saved state of this kind of FMU";
+    if (saved->fingerprint[0] != FINGERPRINT_0 || saved->fingerprint[1] != FINGERPRINT_1 || saved->size != sizeof *saved)
+        return "another FMU or version saved it";
+    return NULL;
+}
+
 /* Go on from a saved state; calls refused until now stay counted. NULL, or why not: then nothing has changed. */
 static const char *restore(Instance *instance, const SavedState *saved)
 {
     Schedule found;
     Moment moment;
-    if (!saved || saved->magic != MAGIC)
-        return "this is no saved state of this kind of FMU";
-    if (saved->fingerprint[0] != FINGERPRINT_0 || saved->fingerprint[1] != FINGERPRINT_1 || saved->size != sizeof *saved)
-        return "another FMU or version saved it";
+    if (foreignness(saved))
+        return foreignness(saved);
     moment = saved->moment;
     if (!is_in_range(&moment) || (moment.stage == STEPPING && !find_schedule(&moment, &found)))
         return "it is damaged";

@@ -58,7 +58,7 @@ class Host(NamedTuple):
         program = folder / f"host_{runner.platform.folder}.exe"
         target = runner.platform.targets[0]
         libraries = () if "windows" in target else ("-ldl",)
-        options = ["-target", target, "-std=c99", "-O2", "-I", str(headers()), str(_SOURCE), *libraries]
+        options = ["-target", target, "-std=c11", "-O2", "-I", str(headers()), str(_SOURCE), *libraries]
         subprocess.run([*compiler(), *options, "-o", str(program)], check=True)
         return cls(program, runner)
 

@@ -22,7 +22,7 @@ from attitude_fmu.fmu_src.trace import trace
 
 HERE = Path(__file__).parent
 _OPTIONS = (
-    *("-std=c99", "-O1", "-g", "-fno-omit-frame-pointer", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC"),
+    *("-std=c11", "-O1", "-g", "-fno-omit-frame-pointer", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC"),
     *("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"),
 )
 _RUNTIMES = {"gcc": ("libasan.so",), "clang": ("libclang_rt.asan.so", "libclang_rt.asan-x86_64.so")}

@@ -94,8 +94,17 @@ def test_host_build_holds_the_library_of_this_platform_only(built: Built) -> Non
     assert binaries == {f"binaries/{here.folder}/AttitudeSensor{here.suffix}"}
 
 
-@pytest.mark.parametrize("compiled_by", ["fmpy", "fmutool"])
-def test_sources_compiled_by_the_user_give_the_same_bits(built: Built, tmp_path: Path, compiled_by: str) -> None:
+def _fuses_multiply_and_add() -> bool:
+    features = Path("/proc/cpuinfo")
+    return features.is_file() and " fma " in features.read_text()
+
+
+@pytest.mark.parametrize(("compiled_by", "flags"), [("fmpy", ""), ("fmpy", "-mfma"), ("fmutool", "")])
+def test_sources_compiled_by_the_user_give_the_same_bits(
+    built: Built, tmp_path: Path, compiled_by: str, flags: str
+) -> None:
+    if flags == "-mfma" and not _fuses_multiply_and_add():
+        pytest.skip("this processor does not fuse multiplication and addition")
     if shutil.which(os.environ.get("CC", "cc")) is None:
         pytest.skip("no C compiler is installed")
     scripts = Path(sys.executable).parent
@@ -108,7 +117,7 @@ def test_sources_compiled_by_the_user_give_the_same_bits(built: Built, tmp_path:
         pytest.importorskip("fmu_manipulation_toolbox")
         source, theirs = theirs, tmp_path / "compiled.fmu"
         command = [str(scripts / "fmutool"), "-input", str(source), "-output", str(theirs), "-compile-sources"]
-    environment = {**os.environ, "PATH": f"{scripts}{os.pathsep}{os.environ['PATH']}"}
+    environment = {**os.environ, "PATH": f"{scripts}{os.pathsep}{os.environ['PATH']}", "CFLAGS": flags}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert done.returncode == 0, done.stdout + done.stderr
     folder = host_platform().folder

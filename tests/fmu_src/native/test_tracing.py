@@ -23,7 +23,8 @@ from attitude_fmu.fmu_src.errors import BuildError
 from attitude_fmu.fmu_src.native.c_code import model_source, number
 from attitude_fmu.fmu_src.native.compile import compiler, headers
 from attitude_fmu.fmu_src.trace import trace
-from attitude_fmu.models.system import Clock, Model
+from attitude_fmu.models.system import Clock, Model, Task
+from attitude_fmu.models.vectors import ZERO3
 
 MODEL = every_kind.MODEL
 FINGERPRINT = "0123456789abcdef" * 4
@@ -79,11 +80,49 @@ def test_a_constant_is_written_to_the_last_bit(value: float) -> None:
 def test_casadi_is_left_as_it_was(fails: bool) -> None:
     assert casadi.GlobalOptions.getSimplificationOnTheFly()
     if fails:
-        with pytest.raises(ZeroDivisionError):
+        with pytest.raises(
+            BuildError, match=r"outputs: ZeroDivisionError: float division by zero \(test_tracing\.py:\d+"
+        ):
             trace(_with_output(lambda value: value + 1.0 / 0.0))
     else:
         trace(MODEL)
     assert casadi.GlobalOptions.getSimplificationOnTheFly()
+    assert float(casadi.SX(2.0)) == 2.0
+
+
+def _with_if(x: Any, p: Any, c: Any) -> Any:
+    return every_kind.outputs(x, p, c) if x.drift > 1.0 else None
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (
+            {"coefficients": lambda p: every_kind.coefficients(p)._replace(sigma=math.exp(p.gain))},
+            r"coefficients: a signal given .* functions of attitude_fmu\.models\.scalar .*\(test_tracing\.py:\d+ in",
+        ),
+        ({"outputs": _with_if}, r"outputs: an if.* on a signal; use where\(.*\(test_tracing\.py:\d+ in _with_if\)$"),
+        ({"coefficients": lambda p: 3.0}, "coefficients must return Coefficients, gave float$"),
+        ({"initial_state": lambda p, c, u: None}, "initial_state must return State, gave NoneType$"),
+        ({"tasks": (Task("move", "fast", lambda *_: ZERO3),)}, "task move must return State, gave tuple$"),
+        (
+            {"initial_state": lambda p, c, u: every_kind.State(0.0, 0.0, 0.0)},
+            "initial_state must give 5 numbers in State",
+        ),
+        (
+            {"tasks": (MODEL.tasks[0], MODEL.tasks[1]._replace(clock="slwo"))},
+            r"task walk runs at a clock 'slwo', which is not there \(clocks: fast, slow\)$",
+        ),
+        ({"seed": lambda p: p.sede}, r"seed, clocks and tasks: AttributeError: .*'sede' \(test_tracing\.py:\d+ in"),
+        (
+            {"outputs": lambda x, p, c: every_kind.outputs("x", p, c)},
+            r"outputs: AttributeError: .* \(every_kind\.py:\d+",
+        ),
+    ],
+)
+def test_what_a_models_author_got_wrong_is_told_with_its_place(change: dict[str, Any], told: str) -> None:
+    with pytest.raises(BuildError, match=f"^Every kind: {told}"):
+        trace(MODEL._replace(**change))
 
 
 def test_a_step_writes_only_what_it_changes() -> None:
@@ -112,7 +151,7 @@ def test_the_c_names_the_models_variables_and_holds_the_start_values() -> None:
 def _warnings(command: list[str], entry: Entry, folder: Path) -> str:
     for name, content in c_sources(trace(import_module(entry.module).MODEL), FINGERPRINT).items():
         (folder / name).write_bytes(content)
-    options = ["-std=c99", "-Wall", "-Wextra", "-isystem", str(headers())]
+    options = ["-std=c11", "-Wall", "-Wextra", "-isystem", str(headers())]
     done = subprocess.run([*command, *options, "fmu.c"], cwd=folder, capture_output=True, text=True, check=False)
     return done.stderr if done.returncode == 0 else f"failed: {done.stderr}"
 
