@@ -123,8 +123,6 @@ class Bench:
         slave, step = self._slave, self._step
         feed, fed = self._call("fmi2SetReal", names)
         read, kept = self._call("fmi2GetInteger", _REGISTERS)
-        made, clock = slave._do_step, slave._time
-        slave._size.value = step
         first, stride, base = values.ctypes.data, values.strides[0], codes.ctypes.data
         row = codes.strides[0]
         start = (self._tick - 0.5) * step
@@ -134,15 +132,14 @@ class Bench:
                 now = start + k * step
                 if names:
                     fed.value = first + k * stride
-                    slave_status = feed()
-                    if slave_status > WARNING:
-                        raise slave.failed("fmi2SetReal", slave_status, now)
-                clock.value = now
-                status = made()
-                if status > WARNING:
-                    raise slave.failed("fmi2DoStep", status, now)
+                    status = feed()
+                    if status > WARNING:
+                        raise slave.failed("fmi2SetReal", status, now)
+                slave.step(now, step)
                 kept.value = base + k * row
-                read()
+                status = read()
+                if status > WARNING:
+                    raise slave.failed("fmi2GetInteger", status, now)
             self._progress((last - block) * step)
 
     def _call(self, function: str, names: tuple[str, ...]) -> tuple[Callable[[], int], c_void_p]:

@@ -127,6 +127,9 @@ def run_command(
         run(request)
 
 
+_SPECIMEN_HELP = "One piece of the device, drawn from the datasheet's tolerances; 0 is without errors."
+
+
 @application.command()
 def build(
     names: Annotated[list[str] | None, typer.Argument(metavar="NAME", help="Which FMUs; all by default.")] = None,
@@ -137,13 +140,51 @@ def build(
         Platforms, typer.Option(help="What native FMUs are compiled for: this machine alone, or every platform.")
     ] = "host",
     dist: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder to build into.")] = Path("dist"),
+    device: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DEVICE",
+            help="Build the attitude sensor with the numbers of this device as start values, as AttitudeSensor_DEVICE.",
+        ),
+    ] = None,
+    specimen: Annotated[int, typer.Option(metavar="N", min=0, help=_SPECIMEN_HELP)] = 0,
 ) -> None:
     """Build the project's FMUs where they are missing or older than their sources.
 
-    Example: attitude-fmu build AttitudeSensor --platform all --dist fmus
+    Examples: attitude-fmu build AttitudeSensor --platform all --dist fmus
+
+    attitude-fmu build --device ADIS16354_150 --specimen 3
     """
     with _reported():
-        build_and_tell(dist, names or None, Console(), kinds=kind, platforms=platform)
+        wanted = [*(names or []), *([] if device is None else [_sensor_with(device, specimen)])]
+        build_and_tell(dist, wanted or None, Console(), kinds=kind, platforms=platform)
+
+
+def _sensor_with(device: str, specimen: int) -> str:
+    """Name of the attitude sensor's FMU with the start values of a device."""
+    from attitude_fmu.models.sensors.devices import parameters
+
+    parameters(device, specimen)  # an unknown one is refused with those that there are
+    return f"AttitudeSensor_{device}" + (f"_specimen_{specimen}" if specimen else "")
+
+
+@application.command()
+def device(
+    name: Annotated[str, typer.Argument(metavar="DEVICE", help="A device, for instance ADXRS453_ADXL355.")],
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to write.", show_default="DEVICE.ssv")] = None,
+    specimen: Annotated[int, typer.Option(metavar="N", min=0, help=_SPECIMEN_HELP)] = 0,
+    component: Annotated[
+        str, typer.Option(metavar="NAME", help="Component that the parameters are for; empty: names of the FMU alone.")
+    ] = "sensor",
+) -> None:
+    """Write the parameters of a device as an .ssv file, for run --parameters and for any tool that reads SSP.
+
+    Example: attitude-fmu device ADXRS453_ADXL355 --specimen 7 --out piece_7.ssv
+    """
+    with _reported():
+        from .devices import write_device
+
+        typer.echo(write_device(out or Path(f"{name}.ssv"), name, specimen, component))
 
 
 @application.command()

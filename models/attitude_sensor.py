@@ -691,16 +691,18 @@ def acquire(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws
     read = _read(state.gyro, state.accelerometer, state.slow, inputs, p, k)
     readings = before.readings + 1.0
     time = readings * k.processor_period
-    words = (state.gyro[0].words, state.gyro[1].words, state.gyro[2].words)
+    lost = each_axis(lambda i: _lost(i, p, time))
+    # a lost word has not been read: it counts as missed once one arrives again
+    words = each_axis(lambda i: where(lost[i] > 0.5, before.gyro_words[i], state.gyro[i].words))
     fresh = [words[i] - before.gyro_words[i] for i in range(3)]
     fresh.append(state.accelerometer.words - before.accelerometer_words)
     repeated, missed = before.repeated, before.missed
     real = where(p.ideal > 0.5, 0.0, 1.0)
-    for count in fresh:
-        repeated = repeated + where(count < 0.5, real, 0.0)
+    for count, gone in zip(fresh, (*lost, 0.0), strict=True):
+        repeated = repeated + where(count + gone < 0.5, real, 0.0)
         missed = missed + maximum(count - 1.0, 0.0)
     reading = ReadingState(
-        each_axis(lambda i: where(_lost(i, p, time) > 0.5, before.rate[i], read.rate[i])),
+        each_axis(lambda i: where(lost[i] > 0.5, before.rate[i], read.rate[i])),
         each_axis(lambda i: where(_lost(3 + i, p, time) > 0.5, before.specific_force[i], read.specific_force[i])),
         words,
         state.accelerometer.words,

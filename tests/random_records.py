@@ -13,7 +13,7 @@ COUNTERS = {
     "ticks": (0, 1, 7, 4999, 5001, 5008, 5012, 5063, 9998, 10_003, 123_456),
     "wind.calls": (0, 1, 500),
     "engaged": (0, 1),
-    "attitude.alignment.samples": (0, 10, 999, 1000, 1001),
+    "attitude.alignment.sums.samples": (0, 10, 999, 1000, 1001),
     "attitude.fusion.rest.quiet": (0.0, 1.0, 1.6, 4.0),
     "accelerometer.samples": (0, 4, 5, 7),
     "accelerometer.silent": (0, 0, 1, 2),

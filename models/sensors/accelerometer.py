@@ -383,7 +383,7 @@ def sense_bartlett(
     """Step of the part with Bartlett filters at four times its conversions: an input passes the bandwidth."""
     before, true = state.specific_force, _sensed(force, factor, p, k)
     passed = each_axis(lambda i: low_pass(before[i], true[i], k.low_pass_gain))
-    return AccelerometerState(passed, *state[1:7], each_axis(lambda i: 0.5 * (before[i] + passed[i])), *state[8:])
+    return state._replace(specific_force=passed, mean=each_axis(lambda i: 0.5 * (before[i] + passed[i])))
 
 
 def register(

@@ -23,7 +23,7 @@ from attitude_fmu.models.scalar import PI
 from attitude_fmu.models.system import Model, Run
 
 MODELS = [import_module(entry.module).MODEL for entry in CATALOGUE]
-POINTS = 60
+POINTS = 80
 
 
 @pytest.fixture(autouse=True)

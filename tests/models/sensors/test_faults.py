@@ -144,6 +144,17 @@ def test_lost_frames_hold_the_last_reading_while_the_part_goes_on(device: str, c
     assert readings(run) == readings(run_of(faultless(device), OTHER, STOP))
 
 
+def test_lost_words_of_a_gyro_are_missed_ones() -> None:
+    run = Run(MODEL, with_fault(GYRO, "lost_frames", 1, start=0.1, end=0.2), STILL)
+    run.advance(STILL, 0.1)
+    before = run.outputs().sample
+    run.advance(STILL, 0.19)
+    assert run.outputs().sample == before
+    run.advance(STILL, 0.3)
+    assert run.outputs().sample.repeated == before.repeated
+    assert run.outputs().sample.missed - before.missed == pytest.approx(50, abs=1)  # 0.1 s at 500 words/s
+
+
 def test_two_faults_at_once() -> None:
     p = faultless()._replace(fault=(one_fault("dropped", 0), one_fault("saturated", 4)))
     run = Run(MODEL, p, MOVING)
