@@ -130,13 +130,15 @@ def leaves(record: type) -> tuple[Leaf, ...]:
 
 
 def flatten(value: Any) -> list[Any]:
-    """The scalars of a record, in the order of `leaves`."""
+    """The scalars of a record, in the order of `leaves`; a plain tuple in it holds scalars or tuples, not both."""
     flat: list[Any] = []
     for item in value:
-        if isinstance(item, tuple):
-            flat += flatten(item)
-        else:
+        if not isinstance(item, tuple):
             flat.append(item)
+        elif type(item) is tuple and item and not isinstance(item[0], tuple):
+            flat += item  # long memories at once
+        else:
+            flat += flatten(item)
     return flat
 
 

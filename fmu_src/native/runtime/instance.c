@@ -110,10 +110,14 @@ static fmi2Status refuse_value(Instance *instance, unsigned reference, double va
 
 static int are_finite(const double *values, int count)
 {
-    double sum = 0.0;
-    for (int i = 0; i < count; i++)
-        sum += values[i] - values[i]; /* 0 or NaN */
-    return sum == 0.0;
+    double sum[8] = {0.0}; /* so that no addition waits for the one before */
+    int i = 0;
+    for (; i + 8 <= count; i += 8)
+        for (int j = 0; j < 8; j++)
+            sum[j] += values[i + j] - values[i + j]; /* 0 or NaN */
+    for (; i < count; i++)
+        sum[0] += values[i] - values[i];
+    return sum[0] + sum[1] + sum[2] + sum[3] + sum[4] + sum[5] + sum[6] + sum[7] == 0.0;
 }
 
 static fmi2Status refuse_runaway(Instance *instance, int first, int count)

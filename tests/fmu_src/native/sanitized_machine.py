@@ -28,7 +28,7 @@ from attitude_fmu.fmu_src.saved_state import INITIALISING, INSTANTIATED, STEPPIN
 _MOST_UNITS, _MOST_STATES = 4, 6
 _CUT = 800
 _NAMES = ("unit", "100 % of %s%n", "größer", "x" * 3000)
-_TOLERATED = ("ran away", "too short a period")
+_TOLERATED = ("ran away", "too short a period", "too small", "too large")  # the last two: inputs by their slopes
 _STAGE_AFTER = {
     "enter": ("EnterInitializationMode", INITIALISING),
     "leave": ("ExitInitializationMode", STEPPING),
