@@ -1,4 +1,4 @@
-"""What one communication step costs: ours against an empty pythonfmu slave with the same ports.
+"""What one communication step of the Python kind costs: ours against an empty pythonfmu slave with the same ports.
 
 ``python benchmarks/communication_step.py [NAME ...] [--steps N]``. One step sets all inputs, calls ``doStep(1 ms)`` and
 gets all outputs, through FMPy, both in one run and in turns; the sensor's quotient has to stay below 10.
@@ -100,7 +100,7 @@ class _Stepper:
 def measure(identifier: str, steps: int) -> tuple[float, float, int, int]:
     """Median cost in us of our FMU's step and of the empty one's, and their numbers of inputs and outputs."""
     with tempfile.TemporaryDirectory() as folder:
-        ours_archive = build(identifier, Path(folder))
+        ours_archive = build(identifier, Path(folder), "python")
         description = read_model_description(str(ours_archive))
         numbers = [sum(v.causality == c for v in description.modelVariables) for c in ("input", "output")]
         ours = _Stepper(ours_archive, {"Integer": 1, "Boolean": False})

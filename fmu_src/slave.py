@@ -20,7 +20,7 @@ from typing import Any, ClassVar, NoReturn
 
 from pythonfmu import Fmi2Slave  # type: ignore[import-untyped]
 
-from ..models.errors import ValueRefusedError, digits
+from ..models.errors import ModelStoppedError, ValueRefusedError, digits
 from ..models.record import Leaf, allowed, flatten, refusal, unflatten
 from ..models.system import LATEST_TIME, Model, Run, Snapshot
 from .errors import CallRefusedError, InterfaceError
@@ -41,6 +41,8 @@ from .saved_state import (
     from_bytes,
     to_bytes,
 )
+
+_INT32 = (-(2**31), 2**31 - 1)
 
 
 class ModelSlave(Fmi2Slave):  # type: ignore[misc]
@@ -224,7 +226,20 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def get_integer(self, vrs: list[int]) -> list[int]:
-        return [int(value) for value in self._get(INTEGER, vrs)]
+        values = self._get(INTEGER, vrs)
+        whole = [int(value) for value in values]
+        if whole != values or (whole and not (min(whole) >= _INT32[0] and max(whole) <= _INT32[1])):
+            self._refuse_whole(vrs, values)
+        return whole
+
+    def _refuse_whole(self, vrs: list[int], values: list[Any]) -> NoReturn:
+        reference, value = next(
+            (reference, value)
+            for reference, value in zip(vrs, values, strict=True)
+            if value != int(value) or not _INT32[0] <= value <= _INT32[1]
+        )
+        name = f"{self.instance_name}.{self._ports.interface.variables[reference].name}"
+        raise ModelStoppedError(f"{name} = {digits(value)} does not fit into an integer")
 
     @guarded
     def get_boolean(self, vrs: list[int]) -> list[bool]:

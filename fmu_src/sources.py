@@ -60,12 +60,12 @@ def _imported(name: str, is_package: bool, tree: ast.AST) -> Iterator[str]:
             yield from (f"{base}.{alias.name}" for alias in node.names)
 
 
-def _followed(name: str, imported: list[str]) -> list[str]:
+def _followed(name: str, is_package: bool, imported: list[str]) -> list[str]:
     """Which of its imports go into an FMU with a module: ours, and those of its own package.
 
     Raises `BuildError` where a user's module imports what does not: such an FMU would lack it, or hide its changes.
     """
-    own = name.partition(".")[0] if "." in name else _PACKAGE
+    own = name.partition(".")[0] if "." in name or is_package else _PACKAGE
     followed = [other for other in imported if other.startswith((f"{_PACKAGE}.", f"{own}."))]
     if not name.startswith(f"{_PACKAGE}."):
         for other in imported:
@@ -92,8 +92,9 @@ def _closure(roots: list[str]) -> dict[str, Path]:
             tree = ast.parse(found[name].read_bytes())
         except SyntaxError as error:
             raise BuildError(f"module {name}: line {error.lineno}: {error.msg}") from error
-        waiting += _followed(name, list(_imported(name, is_package, tree)))
-        waiting += [name.rsplit(".", 1)[0]] if name.count(".") > 1 else []
+        waiting += _followed(name, is_package, list(_imported(name, is_package, tree)))
+        parent = name.rpartition(".")[0]
+        waiting += [parent] if parent not in ("", _PACKAGE) else []
     return found
 
 
@@ -197,14 +198,28 @@ class {entry.identifier}(ModelSlave):
 '''
 
 
+def _moved(source: bytes, entry: Entry, package: str) -> bytes:
+    """A module's text with its imports of us, and of the model's own package, turned to the package in the FMU."""
+    text = re.sub(rf"\b{_PACKAGE}(?=\.)".encode(), package.encode(), source)
+    own, is_in_package, _ = entry.module.partition(".")
+    if own == _PACKAGE or not is_in_package:
+        return text
+    for statement, becomes in (
+        (rf"^(\s*from\s+)({own})(?=[.\s])", rf"\1{package}.\2"),
+        (rf"^(\s*import\s+)({own})((?:\.\w+)*\s+as\s)", rf"\1{package}.\2\3"),
+        (rf"^(\s*import\s+)({own})((?:\.\w+)*)(?=\s*$)", rf"\1{package}.\2\3; from {package} import \2"),
+    ):
+        text = re.sub(statement.encode(), becomes.encode(), text, flags=re.MULTILINE)
+    return text
+
+
 def sources_of(entry: Entry) -> Sources:
     """The Python sources of one FMU as they are on disk now."""
     fingerprint = fingerprint_of(entry, "python")
     snake = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", entry.identifier).lower()
     package = f"{snake}_{fingerprint[:12]}"
-    renamed = re.compile(rf"\b{_PACKAGE}(?=\.)".encode())
     files = {
-        f"{package}/{_path_in_package(name, origin)}": renamed.sub(package.encode(), origin.read_bytes())
+        f"{package}/{_path_in_package(name, origin)}": _moved(origin.read_bytes(), entry, package)
         for name, origin in _model_files(entry).items()
     }
     files[f"{package}/__init__.py"] = f'"""Sources of {entry.identifier}, version {version()}."""\n'.encode()

@@ -84,7 +84,9 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
 
 
 def floor(x: Scalar) -> Scalar:
-    return x // 1.0 if isinstance(x, _NUMBER) else x.floor()
+    if isinstance(x, _NUMBER):
+        return x // 1.0 if abs(x) < math.inf else x  # C's floor leaves an infinity what it is, // makes it NaN
+    return x.floor()
 
 
 def absolute(x: Scalar) -> Scalar:

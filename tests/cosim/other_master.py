@@ -22,14 +22,18 @@ class LibCosim:
 
     first = 1
 
-    def __init__(self, ssp: str, parameter_set: str, step: float) -> None:
-        from libcosimpy.CosimExecution import CosimExecution
-        from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
-        from libcosimpy.CosimObserver import CosimObserver
+    @staticmethod
+    def modules() -> tuple[Any, Any, Any]:
+        """What of the package is needed."""
+        from libcosimpy import CosimExecution, CosimLogging, CosimObserver
 
-        log_output_level(CosimLogLevel.WARNING)
-        self.execution = CosimExecution.from_ssp_file(ssp_path=ssp, step_size=round(step * 1e9))
-        self.observer = CosimObserver.create_last_value()
+        return CosimExecution, CosimLogging, CosimObserver
+
+    def __init__(self, ssp: str, parameter_set: str, step: float) -> None:
+        execution, logging, observer = self.modules()
+        logging.log_output_level(logging.CosimLogLevel.WARNING)
+        self.execution = execution.CosimExecution.from_ssp_file(ssp_path=ssp, step_size=round(step * 1e9))
+        self.observer = observer.CosimObserver.create_last_value()
         self.execution.add_observer(self.observer)
 
     def reader(self, name: str, kind: str) -> Callable[[], float]:
@@ -49,10 +53,16 @@ class Ecos:
 
     first = 0
 
-    def __init__(self, ssp: str, parameter_set: str, step: float) -> None:
-        from ecospy import EcosSimulation
+    @staticmethod
+    def modules() -> tuple[Any]:
+        """What of the package is needed."""
+        import ecospy
 
-        self.simulation = EcosSimulation(ssp_path=ssp, step_size=step)
+        return (ecospy,)
+
+    def __init__(self, ssp: str, parameter_set: str, step: float) -> None:
+        (ecospy,) = self.modules()
+        self.simulation = ecospy.EcosSimulation(ssp_path=ssp, step_size=step)
         assert self.simulation.init(parameter_set=parameter_set)
 
     def reader(self, name: str, kind: str) -> Callable[[], float]:
@@ -85,11 +95,13 @@ def rows(master: Any, task: dict[str, Any]) -> Iterator[list[float]]:
 def main() -> None:
     """Do the task; then tell the time (s) of a step."""
     task = json.loads(sys.argv[2])
+    kind = MASTERS[sys.argv[1]]
     try:
-        master = MASTERS[sys.argv[1]](task["ssp"], task["parameter_set"], task["step"])
+        kind.modules()
     except (ImportError, OSError) as error:  # also a shared library that the package needs
         print(error, file=sys.stderr)
         sys.exit(NOT_INSTALLED)
+    master = kind(task["ssp"], task["parameter_set"], task["step"])
     np.save(task["results"], np.array(list(rows(master, task))))
     began = time.perf_counter()
     master.step(1000)

@@ -5,13 +5,13 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 import pythonfmu
-from fmu_instance import EVERY_KIND
+from fmu_instance import EVERY_KIND, Instance
 
 from attitude_fmu.fmu_src import build as building
 from attitude_fmu.fmu_src import sources
@@ -321,6 +321,101 @@ def test_a_module_that_is_no_model_is_told_in_one_line(
     assert str(caught.value).startswith("Wrong could not be built: ")
     assert str(caught.value).endswith(told)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("statement", ["import my_helper", "from my_helper import FACTOR"])
+def test_a_helper_module_beside_the_model_is_refused_with_both_names(
+    own_model: tuple[Entry, Path], tmp_path: Path, statement: str
+) -> None:
+    entry, source = own_model
+    (tmp_path / "my_helper.py").write_text("FACTOR = 0.9\n")
+    source.write_text(source.read_text().replace("from math import inf", f"from math import inf\n{statement}"))
+    with pytest.raises(BuildError, match=r"module own_model imports my_helper[.\w]*: .*put it there$"):
+        build(entry, tmp_path / "dist")
+
+
+HELPED = {"rate[1]": 2.0, "temperature": 310.0}
+
+
+def _packaged(folder: Path, statement: str = "from .my_helper import FACTOR") -> tuple[Entry, Path]:
+    """The test model in a package of its own, with a factor in a helper module there, which `statement` imports."""
+    package = folder / "my_package"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("from .my_helper import FACTOR as SAME\n")
+    (package / "my_helper.py").write_text("FACTOR = 0.8\n")
+    text = SOURCE.read_text()
+    assert "scale(0.9, x.filtered)" in text
+    text = text.replace("scale(0.9, x.filtered)", "scale(FACTOR, x.filtered)")
+    (package / "my_model.py").write_text(text.replace("from math import inf", f"from math import inf\n{statement}"))
+    return Entry("MyModel", "my_package.my_model"), package / "my_helper.py"
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Iterator[pytest.MonkeyPatch]:
+    """The folder as one where modules are found, until it is undone; packages from there are forgotten then."""
+    with pytest.MonkeyPatch.context() as context:
+        context.syspath_prepend(str(tmp_path))
+        yield context
+    _forget()
+
+
+def _forget() -> None:
+    """Looking for a module in a package imports the package."""
+    for name in [name for name in sys.modules if name.partition(".")[0] == "my_package"]:
+        del sys.modules[name]
+
+
+def test_a_model_in_a_package_of_its_own_is_stale_when_a_helper_there_changes(
+    tmp_path: Path, place: pytest.MonkeyPatch, kind: Kind, load: Callable[..., Instance]
+) -> None:
+    entry, helper = _packaged(tmp_path)
+    before = load(build(entry, tmp_path, kind)).initialise(**HELPED).step(20)
+    assert not is_stale(entry, tmp_path, kind)
+    helper.write_text("FACTOR = 0.7\n")
+    assert is_stale(entry, tmp_path, kind)
+    after = load(build(entry, tmp_path, kind)).initialise(**HELPED).step(20)
+    assert before["shown.rate[1]"] != after["shown.rate[1]"]
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "from .my_helper import FACTOR",
+        "from my_package.my_helper import FACTOR",
+        "from my_package import my_helper\nFACTOR = my_helper.FACTOR",
+        "import my_package.my_helper\nFACTOR = my_package.my_helper.FACTOR",
+        "import my_package.my_helper as helper\nFACTOR = helper.FACTOR",
+        "from . import SAME as FACTOR",
+    ],
+)
+def test_a_helper_goes_into_the_fmu_with_its_model(
+    python_fmu: Path, load: Callable[..., Instance], tmp_path: Path, place: pytest.MonkeyPatch, statement: str
+) -> None:
+    fmu = build(_packaged(tmp_path, statement)[0], tmp_path, "python")
+    place.undo()
+    _forget()
+    shutil.rmtree(tmp_path / "my_package")
+    helped, plain = (load(one).initialise(**HELPED).step(20) for one in (fmu, python_fmu))
+    assert helped["shown.rate[1]"] != plain["shown.rate[1]"]
+
+
+@pytest.mark.parametrize("case", ["a home that cannot be written", "a cache of its own", "headers of its own"])
+def test_the_users_environment_changes_no_byte(
+    native_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str
+) -> None:
+    if case == "a home that cannot be written":
+        (tmp_path / "file").write_text("")  # below it not even root can make a folder
+        for name in ("HOME", "XDG_CACHE_HOME"):
+            monkeypatch.setenv(name, str(tmp_path / "file" / name))
+        monkeypatch.delenv("ZIG_GLOBAL_CACHE_DIR", raising=False)
+    elif case == "a cache of its own":
+        monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", str(tmp_path / "cache"))
+    else:
+        (tmp_path / "math.h").write_text("#error the wrong header\n")
+        for name in ("CPATH", "C_INCLUDE_PATH"):
+            monkeypatch.setenv(name, str(tmp_path))
+    assert build(EVERY_KIND, tmp_path).read_bytes() == native_fmu.read_bytes()
+    assert (tmp_path / "cache").exists() == (case == "a cache of its own")
 
 
 def test_only_stale_fmus_are_built(tmp_path: Path) -> None:

@@ -221,6 +221,22 @@ def test_values_read_before_the_start_time_is_known_do_not_move_the_clocks(fmu: 
     assert early["shown.count"] == 2
 
 
+def test_steps_of_no_size_never_walk_time_backwards(unit: Instance) -> None:
+    unit.initialise().step(3)
+    for _ in range(5):
+        unit.fmu.doStep(3e-3 - 0.9e-9, 0.0)
+    assert "stands at t = 0.003 s" in unit.refusal(lambda: unit.fmu.doStep(3e-3 - 1.8e-9, 0.0))
+    unit.step(start=3e-3)
+    assert unit["shown.count"] == 4
+
+
+def test_a_communication_point_may_miss_by_a_millionth_of_a_step_but_not_of_more_than_a_second(unit: Instance) -> None:
+    unit.initialise(period=1.0)
+    for length, miss in ((0.1, 2e-7), (10.0, 2e-6)):
+        assert "but the FMU stands at t = 0 s" in unit.refusal(lambda m=miss, n=length: unit.fmu.doStep(m, n))
+    unit.fmu.doStep(0.9e-6, 10.0)
+
+
 def test_after_terminate_values_are_read_and_nothing_else(unit: Instance) -> None:
     unit.initialise().step(2)
     saved = unit.fmu.getFMUstate()

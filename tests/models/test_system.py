@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, NamedTuple
 
 import pytest
 
 from attitude_fmu.models.errors import ModelStoppedError, ValueRefusedError
 from attitude_fmu.models.record import Integer, Real
+from attitude_fmu.models.scalar import floor
 from attitude_fmu.models.system import Clock, Model, Run, Task
 
 
@@ -143,3 +145,25 @@ def test_equal_seeds_give_equal_noise_and_others_do_not() -> None:
         return float(run.state.noise)
 
     assert noise(7) == noise(7) != noise(8)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"coefficients": lambda p: Coefficients(p.fast * math.inf)}, "bench.coefficient.fast = inf: the numbers ran"),
+        ({"initial_state": lambda _p, _k, _u: State(noise=math.nan)}, "bench.state.noise = nan: the numbers ran away"),
+    ],
+)
+def test_numbers_that_run_away_are_refused_at_the_start(change: dict[str, Any], told: str) -> None:
+    with pytest.raises(ModelStoppedError, match=told):
+        Run(MODEL._replace(**change), Parameters(), Inputs(), name="bench")
+
+
+def test_a_state_that_runs_away_is_refused_at_the_end_of_the_step() -> None:
+    run = Run(MODEL, Parameters(gain=1e308), Inputs(), name="bench")
+    with pytest.raises(ModelStoppedError, match=r"bench.state.ticks = inf: the numbers ran away"):
+        run.advance(Inputs(), 0.01)
+
+
+def test_the_floor_of_an_infinity_is_itself_as_in_c() -> None:
+    assert [floor(math.inf), floor(-math.inf), floor(-0.5), floor(2.5)] == [math.inf, -math.inf, -1.0, 2.0]

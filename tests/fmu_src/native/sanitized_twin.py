@@ -9,7 +9,15 @@ from typing import Any, NamedTuple
 
 from attitude_fmu.fmu_src.interface import Interface, Variable
 from attitude_fmu.fmu_src.ports import limits_of
-from attitude_fmu.fmu_src.saved_state import INITIALISING, INSTANTIATED, STEPPING, STOPPED, TERMINATED, TIME_SLACK
+from attitude_fmu.fmu_src.saved_state import (
+    INITIALISING,
+    INSTANTIATED,
+    STEPPING,
+    STOPPED,
+    TERMINATED,
+    TIME_ROUNDING,
+    TIME_SLACK,
+)
 from attitude_fmu.models.errors import AttitudeFmuError
 from attitude_fmu.models.record import unflatten
 from attitude_fmu.models.system import LATEST_TIME, TIME_TOLERANCE, Model, check_rules
@@ -37,6 +45,8 @@ class Moment(NamedTuple):
     start_time: float
     time: float
     stage: int
+    is_sloped: int
+    stale: int
 
 
 class Layout:
@@ -53,8 +63,8 @@ class Layout:
         words = self.form.unpack(content)[HEAD_WORDS:]
         values, rest = words[: self.variables], words[self.variables :]
         slopes, rest = rest[: self.inputs + 1], rest[self.inputs + 1 :]
-        ticks, (start_time, time, stage, _is_sloped, _stale, _checksum) = rest[: self.clocks], rest[self.clocks :]
-        return Moment(values, slopes, ticks, start_time, time, stage)
+        ticks, last = rest[: self.clocks], rest[self.clocks : -1]
+        return Moment(values, slopes, ticks, *last)
 
 
 class Facts:
@@ -98,22 +108,25 @@ class Twin:
         self.refused = 0
         self.is_wild = False
         self.ticks: tuple[int, ...] = (0,) * len(self.facts.model.clocks)
+        self.slopes = [0.0] * self.facts.layout.inputs
+        self.is_sloped = False
 
     def copied(self) -> Twin:
         """As it is now, to go back to."""
         twin = copy.copy(self)
-        twin.values = list(self.values)
+        twin.values, twin.slopes = list(self.values), list(self.slopes)
         return twin
 
     def go_back(self, saved: Twin) -> None:
-        for name in ("stage", "start_time", "time", "is_wild", "ticks"):
+        for name in ("stage", "start_time", "time", "is_wild", "ticks", "is_sloped"):
             setattr(self, name, getattr(saved, name))
-        self.values = list(saved.values)
+        self.values, self.slopes = list(saved.values), list(saved.slopes)
 
     def adopt(self, moment: Moment) -> None:
         """Go on from a moment that was tampered with."""
         self.stage, self.start_time, self.time = moment.stage, moment.start_time, moment.time
         self.values, self.ticks = list(moment.values[: self.facts.settable]), moment.ticks
+        self.slopes, self.is_sloped = list(moment.slopes[:-1]), bool(moment.is_sloped)
         self.is_wild = True
 
     def may(self, call: str) -> bool:
@@ -159,9 +172,17 @@ class Twin:
             self.may("DoStep")
             and size >= 0.0
             and time + size <= LATEST_TIME
-            and abs(time - self.time) <= TIME_SLACK * size + 1e-9
+            and abs(time - self.time) <= TIME_SLACK * min(size, 1.0) + TIME_ROUNDING
+            and self._stays_in_range(size)
             and self.obeys_rules()
         )
+
+    def _stays_in_range(self, size: float) -> bool:
+        """Whether inputs that follow a slope do."""
+        first = self.facts.interface.inputs.start
+        sloped = [(i, slope) for i, slope in enumerate(self.slopes, first) if self.is_sloped and slope]
+        limits = self.facts.limits
+        return all(limits[i][0] <= self.values[i] + slope * size <= limits[i][1] for i, slope in sloped)
 
     def may_derive(self, unknowns: Sequence[int], knowns: Sequence[int]) -> bool:
         interface = self.facts.interface
@@ -188,8 +209,15 @@ class Twin:
         for reference, value in zip(references, values, strict=True):
             self.values[reference] = float(value)
 
+    def set_slopes(self, references: Sequence[int], slopes: Sequence[float]) -> None:
+        for reference, slope in zip(references, slopes, strict=True):
+            self.slopes[reference - self.facts.interface.inputs.start] = slope
+            self.is_sloped |= slope != 0.0
+
     def advance(self, until: float) -> None:
-        self.time = until
+        self.time = max(until, self.time)
+        if self.is_sloped:
+            self.slopes, self.is_sloped = [0.0] * len(self.slopes), False
         if not self.is_wild:
             coefficients = self.facts.model.coefficients(self._parameters())
             periods = [float(clock.period(coefficients)) for clock in self.facts.model.clocks]

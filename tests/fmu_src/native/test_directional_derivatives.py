@@ -6,11 +6,12 @@ import random
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmu_instance import EVERY_KIND, Instance
 
 from attitude_fmu.fmu_src.catalogue import CATALOGUE, Entry
@@ -193,6 +194,39 @@ def test_they_are_linear_in_the_direction(unit: Instance, model: Model) -> None:
         assert whole[unknown] == pytest.approx(sum(part[unknown] for part in parts), abs=1e-9 * size + 1e-15)
 
 
+def _ends(variable: Any) -> list[float]:
+    limits = {0.0, *(float(end) for end in (variable.min, variable.max) if end is not None)}
+    low, high = (float(end) if end is not None else sign * inf for end, sign in ((variable.min, -1), (variable.max, 1)))
+    return [value for value in sorted(limits) if low <= value <= high]
+
+
+def _taken(call: Callable[[], Any]) -> bool:
+    try:
+        call()
+    except FMICallException:
+        return False
+    return True
+
+
+def test_they_are_finite_with_any_parameter_at_zero_or_at_an_end_of_its_range(unit: Instance, model: Model) -> None:
+    unknowns = list(_at_initialisation(model)(_starts(model)))
+    settable = _knowns(model, {"": model.Parameters}) + _knowns(model, {"": model.Inputs})
+    asked = 0
+    for name in _knowns(model, {"": model.Parameters}):
+        for value in _ends(unit.variables[name]):
+            unit.fmu.reset()
+            unit[name] = value
+            if not _taken(lambda: unit[unknowns[0]]):
+                continue  # it does not go together with the others
+            for knowns in ([name], settable):
+                assert all(map(isfinite, _derivatives(unit, unknowns, dict.fromkeys(knowns, 1.0)).values()))
+            unit.initialise().step(2)
+            for knowns in ([name], settable + _knowns(model, {"state.": model.State})):
+                assert all(map(isfinite, _derivatives(unit, unknowns, dict.fromkeys(knowns, 1.0)).values()))
+            asked += 1
+    assert asked > len(settable)
+
+
 # --- the FMU against itself, and what is refused
 
 
@@ -218,6 +252,23 @@ def test_the_outputs_of_the_fmu_move_as_it_says(small: Instance) -> None:
     shown(0.0)
     found = _derivatives(small, unknowns, DIRECTION)
     assert list(found.values()) == pytest.approx([(a - b) / 2e-5 for a, b in zip(above, below, strict=True)], rel=1e-8)
+
+
+def test_a_variable_named_twice_adds_up(small: Instance) -> None:
+    small.initialise(**POINT)
+    square, rate, gain = (small.variables[n].valueReference for n in ("shown.square", "state.filtered[1]", "gain"))
+    once = small.fmu.getDirectionalDerivative([square], [rate, gain], [1.0, 0.5])
+    twice = small.fmu.getDirectionalDerivative([square], [rate, gain, rate], [0.75, 0.5, 0.25])
+    assert twice == once != [0.0]
+
+
+def test_a_derivative_that_is_no_number_is_refused(small: Instance) -> None:
+    small.initialise(**POINT)
+    reason = small.refusal(
+        lambda: _derivatives(small, ["shown.rate[1]", "shown.square"], {"state.filtered[1]": 1.7e308})
+    )
+    assert reason == "EveryKind: the derivative of shown.square is inf here"
+    assert small["refused_calls"] == 1
 
 
 def test_a_tuned_parameter_counts_at_once(small: Instance) -> None:

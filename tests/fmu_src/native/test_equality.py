@@ -8,12 +8,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import every_kind
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmu_instance import EVERY_KIND, Instance
 from random_records import settable_near
 from refused_calls import REFUSED
 
+from attitude_fmu.fmu_src.build import build
 from attitude_fmu.fmu_src.catalogue import CATALOGUE, KINDS, Entry, Kind
 from attitude_fmu.fmu_src.units import completed
 from attitude_fmu.models.errors import AttitudeFmuError
@@ -218,6 +220,8 @@ CALLS: dict[str, Callable[[Instance], Any]] = {
     "nothing": lambda unit: unit.fmu.setReal([], []),
     "all": lambda unit: unit.bits(),
     "none": lambda unit: unit.fmu.getReal([]),
+    "save": lambda unit: unit.serialised(),
+    "restore": lambda unit: unit.restore(unit.serialised()),
     "terminate": lambda unit: unit.fmu.terminate(),
     "reset": lambda unit: unit.fmu.reset(),
 }
@@ -230,6 +234,10 @@ def _outcome(unit: Instance, call: Callable[[Instance], Any]) -> str:
     except FMICallException:
         return unit.log[-1].rpartition("\n")[2]
     return "taken"
+
+
+def _outcomes(unit: Instance, *calls: Callable[[Instance], Any]) -> list[str]:
+    return [*(_outcome(unit, call) for call in calls), str(unit["refused_calls"])]
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -245,3 +253,117 @@ def test_each_stage_takes_the_same_calls(built: Built, load: Load, stage: str) -
         assert outcomes[0] == outcomes[1], name
         refused += outcomes[0][0] != "taken"
     assert refused > 1
+
+
+def test_a_state_whose_parameters_disagree_is_saved_restored_and_refused_alike(built: Built, load: Load) -> None:
+    found = []
+    for unit in _pair(built, load, EVERY_KIND):
+        STAGES["disagreeing"](unit)
+        data = unit.serialised()
+        outcomes = _outcomes(
+            unit,
+            lambda unit: unit.__setitem__("lower", 0.0),
+            lambda unit: unit.step(1),
+            lambda unit, data=data: unit.restore(data),  # type: ignore[misc]
+            lambda unit: unit.step(1),
+            lambda unit: unit["shown.square"],
+            lambda unit: unit["lower"],
+            lambda unit: unit.__setitem__("gain", 3.0),
+            lambda unit: unit.step(1),
+        )
+        found.append((outcomes, unit.bits()))
+    assert found[0] == found[1]
+    refused = "EveryKind.lower = 2: more than 100 % of the gain %s %d (allowed: 1 or less)"
+    assert found[0][0] == ["taken"] * 3 + [refused] * 2 + ["taken"] * 3 + ["2"]
+
+
+# --- numbers at their limits
+
+
+FAR = (1e308, -1e308, 1e160, -1e160)
+
+
+def _far(unit: Instance, name: str, value: float, is_late: bool) -> list[str]:
+    """What a short run answers with one variable far off, set before or after initialisation, the inputs not at 0."""
+    unit.fmu.reset()
+    inputs = [v for v in unit.variables.values() if v.causality == "input" and v.type == "Real" and v.name != name]
+    for i, one in enumerate(inputs):
+        unit[one.name] = float(one.start) + 0.01 * (i % 7 - 2)
+
+    def change(unit: Instance) -> None:
+        unit[name] = value
+
+    steps = [lambda unit, i=i: unit.step(1, start=i * 1e-3) for i in range(3)]
+    begin = [lambda unit: unit.initialise(), steps[0]]
+    calls = [*begin, change] if is_late else [change, *begin]
+    return _outcomes(unit, *calls, *steps[1:], lambda unit: unit.bits())
+
+
+@pytest.mark.parametrize("is_late", [False, True])
+def test_numbers_that_run_away_are_refused_at_the_same_call_with_the_same_text(
+    built: Built, load: Load, entry: Entry, is_late: bool
+) -> None:
+    units = _pair(built, load, entry)
+    variables = [v for v in units[0].variables.values() if v.causality in ("parameter", "input") and v.type == "Real"]
+    ran_away = set()
+    for variable in variables:
+        is_limited = variable.min is not None and variable.max is not None
+        for value in FAR[:1] if is_limited else FAR:
+            native, python = (_far(unit, variable.name, value, is_late) for unit in units)
+            assert native == python, (variable.name, value)
+            ran_away |= {text for text in native if "ran away" in text}
+    assert bool(ran_away) == (entry.identifier in ("EveryKind", "AttitudeSensor"))
+
+
+@pytest.fixture(scope="module")
+def unlimited_fmus(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Both kinds of a variant of EveryKind whose integers know no limits."""
+    folder = tmp_path_factory.mktemp("unlimited")
+    source = Path(every_kind.__file__).read_text()
+    for limited in ('Integer("key of all noise", min=0)', 'Integer("counts added to the register", min=-9, max=9, '):
+        assert limited in source
+        source = source.replace(limited, limited.partition(", m")[0] + (")" if limited.endswith(")") else ", "))
+    (folder / "unlimited_model.py").write_text(source)
+    with pytest.MonkeyPatch.context() as place:
+        place.syspath_prepend(str(folder))
+        return [build(Entry("Unlimited", "unlimited_model"), folder, kind) for kind in KINDS]
+
+
+@pytest.fixture
+def unlimited(unlimited_fmus: list[Path], load: Load) -> tuple[Instance, Instance]:
+    native, python = map(load, unlimited_fmus)
+    return native, python
+
+
+LEAST = -(2**31)
+
+
+def test_the_least_integer_is_set_read_saved_and_restored(unlimited: tuple[Instance, Instance]) -> None:
+    for unit in unlimited:
+        unit.initialise(**{"noise.seed": LEAST, "shift": LEAST})
+        data = unit.serialised()
+        unit["shift"] = 2**31 - 1
+        unit.restore(data)
+        assert (unit["noise.seed"], unit["shift"], unit["shown.count"]) == (LEAST, LEAST, LEAST)
+        unit.step(1)
+        assert unit["shown.count"] == LEAST + 1
+
+
+def test_a_whole_number_that_is_no_fmi_integer_is_refused_alike(unlimited: tuple[Instance, Instance]) -> None:
+    found = [
+        _outcomes(unit.initialise(shift=2**31 - 1), lambda unit: unit.step(1), lambda unit: unit["shown.count"])
+        for unit in unlimited
+    ]
+    assert found[0] == found[1] == ["taken", "Unlimited.shown.count = 2147483648 does not fit into an integer", "1"]
+
+
+def test_a_negative_seed_gives_the_same_noise(unlimited: tuple[Instance, Instance]) -> None:
+    noises = []
+    for seed in (-1, LEAST, 1):
+        for unit in unlimited:
+            unit.fmu.reset()
+            unit.initialise(**{"noise.seed": seed}).step(20)
+        native, python = (unit.bits() for unit in unlimited)
+        assert native == python
+        noises.append(native["shown.rate[1]"])
+    assert len(set(noises)) == 3

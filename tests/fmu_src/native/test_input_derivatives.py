@@ -153,6 +153,22 @@ def test_what_is_no_slope_of_a_real_input_is_refused_and_changes_nothing(
     assert unit.bits() == untouched.bits()
 
 
+@pytest.mark.parametrize(
+    ("slope", "reason"), [(1e4, "1298.15 K: too large"), (-1e4, "-701.85 K: too small, kelvin wanted")]
+)
+def test_a_slope_that_leaves_the_range_within_a_step_is_refused_and_changes_nothing(
+    native_fmu: Path, load: Load, slope: float, reason: str
+) -> None:
+    unit, other = load(native_fmu).initialise(), load(native_fmu).initialise()
+    for one in (unit, other):
+        _slope(one, temperature=slope)
+    told = unit.refusal(lambda: unit.step(1, 0.1), by="fmi2DoStep")
+    assert told == f"EveryKind.temperature = {reason} (allowed: 200 to 400 K)"
+    for one in (unit, other):
+        one.step(1, 5e-3)  # which stays in it
+    assert unit.bits() == other.bits()
+
+
 def test_slopes_are_refused_where_nothing_can_be_set(unit: Instance) -> None:
     unit.initialise().step()
     unit.fmu.terminate()

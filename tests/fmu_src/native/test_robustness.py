@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
+import os
 import re
+import shutil
+import struct
 import subprocess
 import sys
 import zipfile
+import zlib
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from ctypes import c_char_p
+from ctypes import byref, c_char_p
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 from fmi2_calls import ERROR, OK, Library, Unit, array
 from fmpy import read_model_description, simulate_fmu
+from sanitized_twin import HEAD_WORDS
 
 from attitude_fmu.fmu_src.catalogue import CATALOGUE, Entry
-from attitude_fmu.fmu_src.native.compile import host_platform
+from attitude_fmu.fmu_src.native.compile import compiler, headers, host_platform
 
 EXTREMES = (math.nan, math.inf, -math.inf, 5e-324, -5e-324, 1e-320, -0.0, 1e308, -1e308, sys.float_info.max)
 UNITS, THREADS = 64, 8
@@ -143,30 +147,24 @@ def test_everything_at_the_end_of_its_range_at_once_is_digested_or_refused_by_na
 # --- many instances ---------------------------------------------------------------------------------------------------
 
 
-def _history(fmu: Fmu, number: int) -> bytes:
-    """The state in which an instance with its own seed and inputs ends."""
-    unit = fmu.unit(f"unit {number}")
-    seeds = [v.valueReference for v in fmu.of("Integer", "parameter") if v.name.split(".")[-1] == "seed"]
-    assert unit.set("Integer", seeds, [1000 + number] * len(seeds)) == OK
-    assert unit.initialise() == [OK, OK, OK]
-    inputs = fmu.of("Real", "input")
-    for i in range(40):
-        values = [float(v.start) + 0.01 * math.sin(number + i + v.valueReference) for v in inputs]
-        assert unit.set("Real", [v.valueReference for v in inputs], values) == OK
-        assert unit.step(i * 7.3e-3, 7.3e-3) == OK
-    state = unit.save()
-    content = unit.serialised(state)
-    unit.drop(state)
-    unit.free()
-    return content
+@pytest.fixture(scope="module")
+def threads_host(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """threads.c, compiled."""
+    if sys.platform != "linux":
+        pytest.skip("the host is for Linux")
+    program = tmp_path_factory.mktemp("threads") / "threads"
+    source = Path(__file__).with_name("threads.c")
+    options = ["-std=gnu11", "-O2", "-I", str(headers()), str(source), "-ldl", "-lm", "-lpthread"]
+    subprocess.run([*compiler(), "-target", host_platform().targets[0], *options, "-o", str(program)], check=True)
+    return program
 
 
-def test_instances_in_many_threads_do_what_they_do_one_after_the_other(fmu: Fmu) -> None:
-    alone = [_history(fmu, number) for number in range(UNITS)]
-    with ThreadPoolExecutor(THREADS) as pool:
-        together = list(pool.map(lambda number: _history(fmu, number), range(UNITS)))
-    assert together == alone
-    assert len(set(alone)) == UNITS
+def test_instances_in_many_threads_do_what_they_do_one_after_the_other(fmu: Fmu, threads_host: Path) -> None:
+    seeds = [str(v.valueReference) for v in fmu.of("Integer", "parameter") if v.name.split(".")[-1] == "seed"]
+    inputs = [f"{v.valueReference}:{v.start}" for v in fmu.of("Real", "input")]
+    command = [threads_host, fmu.library.loaded._name, fmu.guid.decode(), str(UNITS), str(THREADS), ",".join(seeds)]
+    done = subprocess.run([*command, *inputs], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["0", str(UNITS)]
 
 
 _CYCLES = """
@@ -222,6 +220,71 @@ def test_the_state_of_another_fmu_is_refused(entry: Entry, fmu: Fmu, built: Buil
     other.drop(foreign)
     unit.free()
     other.free()
+
+
+# words of a serialised state, counted from its end; the last is the checksum
+_STALE, _IS_SLOPED = -2, -3
+_OUTPUTS_STALE, _STATE_STALE = 1, 4
+
+
+def _doctored(content: bytes, word: int, value: int) -> bytes:
+    words = list(struct.unpack(f"<{len(content) // 8}q", content))
+    words[word] = value
+    body = struct.pack(f"<{len(words) - 1}q", *words[:-1])
+    return body + struct.pack("<Q", zlib.crc32(body))
+
+
+def _refused_word(fmu: Fmu) -> int:
+    """Where the count of refused calls lies."""
+    (reference,) = (v.valueReference for v in fmu.variables if v.name == "refused_calls")
+    return 8 * (HEAD_WORDS + reference)
+
+
+@pytest.mark.parametrize(
+    ("word", "value", "status"),
+    [
+        (_STALE, _OUTPUTS_STALE, OK),
+        (_STALE, 8, ERROR),
+        (_STALE, -1, ERROR),
+        (_STALE, _OUTPUTS_STALE | _STATE_STALE, ERROR),  # while it is stepping
+        (_IS_SLOPED, 1, OK),
+        (_IS_SLOPED, 2, ERROR),
+        (_IS_SLOPED, -1, ERROR),
+    ],
+)
+def test_a_doctored_state_is_refused_and_changes_nothing(fmu: Fmu, word: int, value: int, status: int) -> None:
+    unit = fmu.unit()
+    assert unit.initialise() == [OK, OK, OK]
+    assert unit.step(0.0, 1e-3) == OK
+    state = unit.save()
+    before = unit.serialised(state)
+    taken, doctored = unit.deserialised(_doctored(before, word, value))
+    assert taken == OK
+    assert unit.call("SetFMUstate", doctored) == status
+    if status == ERROR:
+        assert unit.log[-1][2] == "unit: saved state refused: it is damaged"
+        moment = slice(0, _refused_word(fmu)), slice(_refused_word(fmu) + 8, -8)
+        after = unit.serialised(unit.save(state))
+        assert [after[part] for part in moment] == [before[part] for part in moment]
+    assert unit.step(1e-3, 1e-3) == OK
+    for place in (state, doctored):
+        unit.drop(place)
+    unit.free()
+
+
+def test_bytes_of_another_version_are_refused_and_leave_a_reused_state_alone(fmu: Fmu) -> None:
+    unit = fmu.unit()
+    assert unit.initialise() == [OK, OK, OK]
+    state = unit.save()
+    before = unit.serialised(state)
+    for fingerprint in (1, 2):
+        foreign = _doctored(before, fingerprint, 4711)
+        assert unit.call("DeSerializeFMUstate", foreign, len(foreign), byref(state)) == ERROR
+        assert unit.log[-1][2] == "unit: saved state refused: another FMU or version saved it"
+        assert unit.serialised(state) == before
+    assert unit.call("SetFMUstate", state) == OK
+    unit.drop(state)
+    unit.free()
 
 
 # --- places -----------------------------------------------------------------------------------------------------------
@@ -315,3 +378,46 @@ def test_the_message_of_a_very_long_name_is_cut_between_characters(fmu: Fmu, let
     assert name.startswith(text)
     assert 1000 < len(text.encode()) < 1024
     assert unit.logged_names == {name.encode()}
+
+
+_MESSAGES = """
+import locale, sys
+sys.path[:0] = sys.argv[1:3]
+from fmi2_calls import Library, Unit
+print(locale.setlocale(locale.LC_ALL, "") and locale.localeconv()["decimal_point"])
+unit = Unit(Library(sys.argv[3]), b"unit", sys.argv[4].encode(), logging=True)
+unit.initialise(0.25)
+unit.step(7.5, 0.125)
+unit.step(0.25, -0.5)
+unit.set("Real", [int(sys.argv[5])], [1234567.5])
+for _, _, text in unit.log:
+    print(text)
+"""
+
+
+@pytest.fixture(scope="module")
+def comma_locale(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """What makes a process write 0,5."""
+    if shutil.which("localedef") is None:
+        pytest.skip("no localedef")
+    folder = tmp_path_factory.mktemp("locales")
+    command = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(folder / "de_DE.UTF-8")]
+    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        pytest.skip("no German locale to be made here")
+    return {"LOCPATH": str(folder), "LC_ALL": "de_DE.UTF-8"}
+
+
+def test_the_hosts_locale_does_not_change_the_messages(fmu: Fmu, comma_locale: dict[str, str]) -> None:
+    folders = [Path(__file__).parent, Path(__file__).parents[1]]
+    limited = next(v.valueReference for v in fmu.of("Real", "parameter", "input") if v.max and float(v.max) < 1e6)
+    arguments = [*folders, fmu.library.loaded._name, fmu.guid.decode(), limited]
+    told = []
+    for settings in ({"LC_ALL": "C"}, comma_locale):
+        environment = {**os.environ, **settings, "PYTHONIOENCODING": "utf-8"}
+        command = [sys.executable, "-c", _MESSAGES, *map(str, arguments)]
+        done = subprocess.run(command, capture_output=True, encoding="utf-8", check=True, env=environment)
+        told.append(done.stdout.splitlines())
+    assert [lines[0] for lines in told] == [".", ","]
+    assert told[0][1:] == told[1][1:]
+    assert "unit: a step from t = 7.5 s, but the FMU stands at t = 0.25 s" in told[0]
+    assert len(told[0]) == 5
