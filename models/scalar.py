@@ -13,6 +13,8 @@ Scalar = Any  # float, or casadi.SX while tracing
 
 PI = math.pi
 _NUMBER = (float, int)
+_LARGEST_EXPONENT = 709.782712893384
+"""Beyond it exp leaves the range of doubles."""
 
 
 def _symbols() -> Any:
@@ -58,23 +60,34 @@ def either(a: Scalar, b: Scalar) -> Scalar:
 
 
 def sqrt(x: Scalar) -> Scalar:
-    return math.sqrt(x) if isinstance(x, _NUMBER) else x.sqrt()
+    """Square root; outside their domains this and the next four give what C gives, where `math` would raise."""
+    if isinstance(x, _NUMBER):
+        return math.sqrt(x) if x >= 0.0 else math.nan
+    return x.sqrt()
 
 
 def sin(x: Scalar) -> Scalar:
-    return math.sin(x) if isinstance(x, _NUMBER) else x.sin()
+    if isinstance(x, _NUMBER):
+        return math.sin(x) if abs(x) < math.inf else math.nan
+    return x.sin()
 
 
 def cos(x: Scalar) -> Scalar:
-    return math.cos(x) if isinstance(x, _NUMBER) else x.cos()
+    if isinstance(x, _NUMBER):
+        return math.cos(x) if abs(x) < math.inf else math.nan
+    return x.cos()
 
 
 def exp(x: Scalar) -> Scalar:
-    return math.exp(x) if isinstance(x, _NUMBER) else x.exp()
+    if isinstance(x, _NUMBER):
+        return math.exp(x) if x <= _LARGEST_EXPONENT else x * math.inf
+    return x.exp()
 
 
 def log(x: Scalar) -> Scalar:
-    return math.log(x) if isinstance(x, _NUMBER) else x.log()
+    if isinstance(x, _NUMBER):
+        return math.log(x) if x > 0.0 else -math.inf if x == 0.0 else math.nan
+    return x.log()
 
 
 def atan2(y: Scalar, x: Scalar) -> Scalar:
