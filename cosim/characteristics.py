@@ -269,10 +269,6 @@ class Response(NamedTuple):
         pair = slice(last - 1, last + 1)
         return float(np.interp(-decibels, -shown[pair], self.frequency[pair]))
 
-    def decibels_at(self, frequency: float) -> float:
-        """The gain at a frequency (Hz) within those measured."""
-        return float(np.interp(frequency, self.frequency, self.decibels))
-
 
 def frequency_response(sensor: Sensor, part: Part, reference: float, *, folded: bool = False) -> Response:
     """H(f) = Y(f)/U(f) of one multi-sine on all three axes, without errors; `reference` (Hz) is about the cutoff.

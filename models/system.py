@@ -132,9 +132,8 @@ class _Scheduled(NamedTuple):
     key: tuple[int, int]
 
 
-def _check_finite(record: type, value: Any, prefix: str) -> None:
-    """Raise `ModelStoppedError` where one of a record's numbers is none; `prefix` goes before its name."""
-    scalars = flatten(value)
+def _check_finite(record: type, scalars: list[Any], prefix: str) -> None:
+    """Raise `ModelStoppedError` where one of a record's scalars is no number; `prefix` goes before its name."""
     if isfinite(sum(scalars)):
         return
     for leaf, scalar in zip(leaves(record), scalars, strict=True):
@@ -172,7 +171,7 @@ class Run:
             self.state = model.initial_state(parameters, self.coefficients, inputs)
         except (ArithmeticError, ValueError) as error:
             raise ModelStoppedError(f"{self.name}: no initial state: {error}") from error
-        _check_finite(model.State, self.state, f"{self.name}.state.")
+        _check_finite(model.State, flatten(self.state), f"{self.name}.state.")
 
     def _period(self, clock: Clock) -> float:
         period = float(clock.period(self.coefficients))
@@ -193,7 +192,7 @@ class Run:
             self.coefficients = self.model.coefficients(parameters)
         except (ArithmeticError, ValueError) as error:
             raise ModelStoppedError(f"{self.name}: no coefficients from these parameters: {error}") from error
-        _check_finite(self.model.Coefficients, self.coefficients, f"{self.name}.coefficient.")
+        _check_finite(self.model.Coefficients, flatten(self.coefficients), f"{self.name}.coefficient.")
         self.parameters = parameters
 
     def _schedule(self) -> None:
@@ -240,7 +239,7 @@ class Run:
             self.state = state
             counts[clock] = count
             due[clock] = self.start_time + (count + 1) * self._periods[clock]
-        _check_finite(self.model.State, self.state, f"{self.name}.state.")
+        _check_finite(self.model.State, flatten(self.state), f"{self.name}.state.")
 
     def outputs(self) -> Any:
         """What the model shows now."""
@@ -248,9 +247,9 @@ class Run:
 
     def shown(self) -> list[Any]:
         """The scalars of `outputs`; raises `ModelStoppedError` where one is no finite number."""
-        outputs = self.outputs()
-        _check_finite(self.model.Outputs, outputs, f"{self.name}.")
-        return flatten(outputs)
+        scalars = flatten(self.outputs())
+        _check_finite(self.model.Outputs, scalars, f"{self.name}.")
+        return scalars
 
     def snapshot(self) -> Snapshot:
         """A copy of all that evolves."""

@@ -1,20 +1,57 @@
 """Runs an .ssp file in a master that is not ours, in a process of its own, because such a master may take it down.
 
-``python other_master.py libcosim|ecos <task as JSON>``; the task names the .ssp file, the step (s) and how many, what
-to read (name and kind), what to set before which step, and the .npy file to write: a row for each communication point.
+`rows_of` starts ``python other_master.py libcosim|ecos <task as JSON>``; the task names the .ssp file, the step (s) and
+how many, what to read (name and kind), what to set before which step, and the .npy file to write: a row for each
+communication point.
 """
 
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 NOT_INSTALLED = 77
+"""Exit status where the master's own package cannot be imported, and that only."""
+
+
+def rows_of(
+    master: str,
+    ssp: Path,
+    parameter_set: str,
+    step: float,
+    steps: int,
+    read: Sequence[tuple[str, str]],
+    settings: Mapping[int, Sequence[tuple[str, float]]] | None = None,
+) -> np.ndarray[Any, np.dtype[Any]]:
+    """What a master reads at each communication point, a column for each name; skips where it is not installed."""
+    results = ssp.with_suffix(f".{master}.npy")
+    task = {
+        "ssp": str(ssp),
+        "parameter_set": parameter_set,
+        "step": step,
+        "steps": steps,
+        "read": read,
+        "set": settings or {},
+        "results": str(results),
+    }
+    done = subprocess.run(
+        [sys.executable, __file__, master, json.dumps(task)], capture_output=True, text=True, check=False
+    )
+    if done.returncode == NOT_INSTALLED:
+        pytest.skip(f"{master} is not installed completely: {done.stderr.strip()}")
+    assert done.returncode == 0, done.stderr
+    print(done.stdout)
+    rows: np.ndarray[Any, np.dtype[Any]] = np.load(results)
+    results.unlink()
+    return rows
 
 
 class LibCosim:

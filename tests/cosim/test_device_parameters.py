@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from lxml import etree
-from other_master import NOT_INSTALLED
+from other_master import rows_of
 
 from attitude_fmu.cosim.devices import device_parameters, write_device
 from attitude_fmu.cosim.master import simulate
@@ -105,22 +102,6 @@ def test_other_masters_apply_the_file(sensor: System, tmp_path: Path, device: st
     name = mine.parameter_sets[0].name
     placeholder = bench.with_set(ParameterSet(name, {"sensor.seed": 1}))
     ssp = _bound(write_ssp(placeholder, tmp_path / "plain.ssp"), file, tmp_path / "bench.ssp")
-    task = {
-        "ssp": str(ssp),
-        "parameter_set": name,
-        "step": STEP,
-        "steps": STEPS,
-        "read": READ,
-        "set": {},
-        "results": str(tmp_path / "results.npy"),
-    }
-    script = Path(__file__).with_name("other_master.py")
-    done = subprocess.run(
-        [sys.executable, str(script), master, json.dumps(task)], capture_output=True, text=True, check=False
-    )
-    if done.returncode == NOT_INSTALLED:
-        pytest.skip(f"{master} is not installed completely: {done.stderr.strip()}")
-    assert done.returncode == 0, done.stderr
-    rows = np.load(tmp_path / "results.npy")
+    rows = rows_of(master, ssp, name, STEP, STEPS, READ)
     for column, (signal, _) in enumerate(READ):
         assert np.array_equal(rows[1:, column], ours[signal][1:].astype(float)), signal

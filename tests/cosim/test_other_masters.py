@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import fmpy
 import numpy as np
 import pytest
-from other_master import NOT_INSTALLED
+from other_master import rows_of
 
 from attitude_fmu.cosim.master import simulate
 from attitude_fmu.cosim.scenarios import gimbal
@@ -80,46 +80,27 @@ def _agree(theirs: Mapping[str, Records], ours: Records, first: int = 0) -> None
 def _run(
     master: str,
     reference: Reference,
-    folder: Path,
     read: Sequence[tuple[str, str]],
     settings: Mapping[int, Sequence[tuple[str, float]]] | None = None,
 ) -> dict[str, Records]:
-    task = {
-        "ssp": str(reference.ssp),
-        "parameter_set": reference.system.parameter_sets[0].name,
-        "step": STEP,
-        "steps": STEPS,
-        "read": read,
-        "set": settings or {},
-        "results": str(folder / "results.npy"),
-    }
-    script = Path(__file__).with_name("other_master.py")
-    done = subprocess.run(
-        [sys.executable, str(script), master, json.dumps(task)], capture_output=True, text=True, check=False
-    )
-    if done.returncode == NOT_INSTALLED:
-        pytest.skip(f"{master} is not installed completely: {done.stderr.strip()}")
-    assert done.returncode == 0, done.stderr
-    print(done.stdout)
-    rows = np.load(folder / "results.npy")
+    name = reference.system.parameter_sets[0].name
+    rows = rows_of(master, reference.ssp, name, STEP, STEPS, read, settings)
     return {name: rows[:, column] for column, (name, _) in enumerate(read)}
 
 
-def test_libcosim_agrees_with_our_master(reference: Reference, tmp_path: Path) -> None:
-    results = _run("libcosim", reference, tmp_path, reference.readable())
+def test_libcosim_agrees_with_our_master(reference: Reference) -> None:
+    results = _run("libcosim", reference, reference.readable())
     _agree(results, reference.records, first=1)
 
 
-def test_ecos_agrees_with_our_master(reference: Reference, tmp_path: Path) -> None:
-    results = _run("ecos", reference, tmp_path, reference.readable())
+def test_ecos_agrees_with_our_master(reference: Reference) -> None:
+    results = _run("ecos", reference, reference.readable())
     _agree(results, reference.records)
 
 
-def test_refused_value_shows_in_an_output_where_the_master_ignores_statuses(
-    reference: Reference, tmp_path: Path
-) -> None:
+def test_refused_value_shows_in_an_output_where_the_master_ignores_statuses(reference: Reference) -> None:
     settings = {10: [("controller.setpoint.yaw", float("nan"))]}
-    results = _run("ecos", reference, tmp_path, reference.readable(), settings)
+    results = _run("ecos", reference, reference.readable(), settings)
     refused = results.pop("controller.refused_calls")
     assert not refused[:10].any()
     assert (refused[10:] == 1).all()

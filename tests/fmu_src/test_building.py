@@ -18,6 +18,7 @@ from attitude_fmu.fmu_src import sources
 from attitude_fmu.fmu_src.build import build, build_all, folder_of, is_stale
 from attitude_fmu.fmu_src.catalogue import CATALOGUE, KINDS, Entry, Kind
 from attitude_fmu.fmu_src.errors import BuildError
+from attitude_fmu.fmu_src.native import compile as compiling
 from attitude_fmu.fmu_src.native.compile import host_platform
 from attitude_fmu.fmu_src.sources import fingerprint_of, guid_of, sources_of
 
@@ -416,6 +417,18 @@ def test_the_users_environment_changes_no_byte(
             monkeypatch.setenv(name, str(tmp_path))
     assert build(EVERY_KIND, tmp_path).read_bytes() == native_fmu.read_bytes()
     assert (tmp_path / "cache").exists() == (case == "a cache of its own")
+
+
+def test_the_compiler_hears_of_no_headers_of_the_users(monkeypatch: pytest.MonkeyPatch) -> None:
+    tell = "import os, sys; sys.exit(' '.join(sorted(os.environ)))"
+    monkeypatch.setattr(compiling, "compiler", lambda: [sys.executable, "-c", tell])
+    for name in ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "SDKROOT"):
+        monkeypatch.setenv(name, "somewhere")
+    with pytest.raises(BuildError) as told:
+        compiling.compile_all({}, [compiling.host_platform()])
+    heard = set(str(told.value).split())
+    assert "ZIG_LOCAL_CACHE_DIR" in heard
+    assert not heard & {"CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "SDKROOT"}
 
 
 def test_only_stale_fmus_are_built(tmp_path: Path) -> None:
