@@ -15,6 +15,7 @@ from attitude_fmu.fmu_src.build import Platforms
 from attitude_fmu.fmu_src.build_messages import Kinds, build_and_tell
 from attitude_fmu.fmu_src.catalogue import Kind
 from attitude_fmu.models.errors import AttitudeFmuError
+from attitude_fmu.models.sensors.devices import DEVICES
 
 # FMPy, numpy and the rest are imported where they are used: --help answers at once
 
@@ -127,6 +128,7 @@ def run_command(
         run(request)
 
 
+_DEVICES = ", ".join(DEVICES)
 _SPECIMEN_HELP = "One piece of the device, drawn from the datasheet's tolerances; 0 is without errors."
 
 
@@ -144,7 +146,8 @@ def build(
         str | None,
         typer.Option(
             metavar="DEVICE",
-            help="Build the attitude sensor with the numbers of this device as start values, as AttitudeSensor_DEVICE.",
+            help="Build the attitude sensor with the numbers of this device as start values, as AttitudeSensor_DEVICE. "
+            f"Devices: {_DEVICES}.",
         ),
     ] = None,
     specimen: Annotated[int, typer.Option(metavar="N", min=0, help=_SPECIMEN_HELP)] = 0,
@@ -156,21 +159,23 @@ def build(
     attitude-fmu build --device ADIS16354_150 --specimen 3
     """
     with _reported():
+        if specimen and device is None:
+            _refuse_usage(f"--specimen {specimen}: of which device? Name one with --device")
         wanted = [*(names or []), *([] if device is None else [_sensor_with(device, specimen)])]
         build_and_tell(dist, wanted or None, Console(), kinds=kind, platforms=platform)
 
 
 def _sensor_with(device: str, specimen: int) -> str:
     """Name of the attitude sensor's FMU with the start values of a device."""
-    from attitude_fmu.models.sensors.devices import parameters
+    from .devices import device_parameters
 
-    parameters(device, specimen)  # an unknown one is refused with those that there are
+    device_parameters(device, specimen)  # an unknown one is refused with those that there are
     return f"AttitudeSensor_{device}" + (f"_specimen_{specimen}" if specimen else "")
 
 
 @application.command()
 def device(
-    name: Annotated[str, typer.Argument(metavar="DEVICE", help="A device, for instance ADXRS453_ADXL355.")],
+    name: Annotated[str, typer.Argument(metavar="DEVICE", help=f"One of {_DEVICES}.")],
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to write.", show_default="DEVICE.ssv")] = None,
     specimen: Annotated[int, typer.Option(metavar="N", min=0, help=_SPECIMEN_HELP)] = 0,
     component: Annotated[
@@ -211,14 +216,14 @@ def info(
 
 SENSOR_HELP = """Measure a modelled sensor and compare it with its datasheet.
 
-DEVICE is one of the parts that the attitude sensor can be: ADXRS450_ADXL355, ADXRS453_ADXL355, ADIS16354_300, \
-ADIS16354_150, ADIS16354_75 and more. Everything is measured on the native FMU itself: Allan deviation, \
+Everything is measured on the native FMU itself: Allan deviation, \
 noise spectrum, frequency response at every setting of the filters, step response, calibration, temperature drift and \
 register codes.
 
 Written into the output folder: \
 gyro.png and accelerometer.png (the pictures), \
-characteristics.csv (the table that is shown: datasheet, modelled part, verdict, source).
+characteristics.csv (the table that is shown: datasheet, modelled part, verdict, rule, source). \
+A FAIL is a finding: the exit code is 0 whenever all has been measured.
 
 [bold]Examples[/bold]
 
@@ -236,7 +241,7 @@ characteristics.csv (the table that is shown: datasheet, modelled part, verdict,
 
 @application.command("sensor", help=SENSOR_HELP)
 def sensor_command(
-    device: Annotated[str, typer.Argument(help="The parts to measure.", metavar="DEVICE")],
+    device: Annotated[str, typer.Argument(help=f"The parts to measure: {_DEVICES}.", metavar="DEVICE")],
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for pictures and table; made if missing.")] = Path(
         "out"
     ),
@@ -244,7 +249,12 @@ def sensor_command(
         bool, typer.Option("--quick", help="Short records and the chosen filter settings only: a few seconds.")
     ] = False,
     specimen: Annotated[
-        int, typer.Option(metavar="N", min=0, help="Which piece of all that the tolerances allow; 0: the nominal one.")
+        int,
+        typer.Option(
+            metavar="N",
+            min=0,
+            help="Which piece of all that the tolerances allow; 0: the nominal one, without errors to measure.",
+        ),
     ] = 1,
     values: Annotated[
         list[str] | None,

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from attitude_fmu.fmu_src.errors import did_you_mean
+
 from ..fmu_src.units import BASE_UNITS, parse
 from ..models.attitude_sensor import MODEL
 from ..models.record import Boolean, Enumeration, Fact, Integer, leaves
-from ..models.sensors.devices import parameters
+from ..models.sensors.devices import DEVICES, parameters
+from .errors import SystemRefusedError
 from .interface import Interface, Item, Unit, Variable
 from .ssp import write_ssv
 from .system import ParameterSet
@@ -21,12 +24,20 @@ from .system import ParameterSet
 def device_parameters(device: str, specimen: int = 0, component: str = "sensor") -> ParameterSet:
     """Every parameter of a device and of one piece of it, for the attitude sensor that is called `component`.
 
-    Raises `UnknownDeviceError` (an `AttitudeFmuError`) for a device or specimen that there is not.
+    Raises `SystemRefusedError` for a device that there is not, `UnknownDeviceError` for such a specimen.
     """
+    known_device(device)
     prefix = f"{component}." if component else ""
     values = {f"{prefix}{name}": value for name, value in parameters(device, specimen).items()}
     units = {f"{prefix}{name}": unit for name, unit in _units().items() if f"{prefix}{name}" in values}
     return ParameterSet(f"{device}_specimen_{specimen}" if specimen else device, values, units)
+
+
+def known_device(device: str) -> None:
+    """Raise `SystemRefusedError`, with what may be meant, for a device that there is not."""
+    if device not in DEVICES:
+        hint = did_you_mean(device.upper(), DEVICES) or did_you_mean(device, DEVICES)
+        raise SystemRefusedError(f"there is no device called {device!r}{hint} (devices: {', '.join(DEVICES)})")
 
 
 def write_device(path: Path, device: str, specimen: int = 0, component: str = "sensor") -> Path:

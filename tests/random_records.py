@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from typing import Any
 
@@ -18,15 +19,20 @@ COUNTERS = {
     "accelerometer.samples": (0, 4, 5, 7),
     "accelerometer.silent": (0, 0, 1, 2),
     "accelerometer.words": (0, 1, 300),
-    **{f"accelerometer.condition[{axis}]": (0, 0, 1, 2) for axis in (1, 2, 3)},
+    **{f"accelerometer.{w}.condition[{axis}]": (0, 0, 1, 2) for w in ("latest", "earlier") for axis in (1, 2, 3)},
     **{f"gyro[{axis}].condition": (0, 0, 1, 2) for axis in (1, 2, 3)},
     **{f"gyro[{axis}].words": (0, 1, 300, 15_000) for axis in (1, 2, 3)},
     **{f"{part}.misalignment[{axis}]": (0.0, 0.0, 0.01) for part in ("gyro", "accelerometer") for axis in (1, 2, 3)},
+    "gyro.range": (math.radians(75.0), math.radians(150.0), math.radians(300.0)),
     **{f"fault[{i}].start": (0.0, 0.0, 0.3, 1e9) for i in (1, 2)},
     **{f"fault[{i}].end": (0.0, 0.5, 1e9, 1e9) for i in (1, 2)},
     **{f"fault[{i}].size": (-1.0, 0.1) for i in (1, 2)},
 }
-"""Values that reach every branch: start, shutter and knock, end of the alignment, rest, a due word, silence, faults."""
+"""Values that reach every branch: start, shutter and knock, end of the alignment, rest, a due word, silence, faults,
+and the ranges that every part has."""
+
+FOLLOWING = {"accelerometer.filter": "gyro.filter", "accelerometer.divider": "gyro.divider"}
+"""Parameters that have to be what others are."""
 
 NEVER_WILD = ("attitude.q_nb", "attitude.fusion.covariance")
 """What no run can bring to zero or to a hundred times itself."""
@@ -73,8 +79,11 @@ def bits(values: list[float]) -> list[str]:
 
 def legal_parameters(model: Model, chance: random.Random) -> list[float]:
     """Random parameters that go together."""
+    names = [leaf.name for leaf in leaves(model.Parameters)]
     while True:
         parameters = points_near(model.Parameters, defaults(model.Parameters), chance)
+        found = dict(zip(names, parameters, strict=True))
+        parameters = [found[FOLLOWING.get(name, name)] for name in names]
         try:
             check_rules(model, unflatten(model.Parameters, parameters), model.name)
         except ValueRefusedError:

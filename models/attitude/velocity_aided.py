@@ -4,7 +4,7 @@ Specific force is integrated in navigation coordinates to a horizontal velocity;
 measurement 0 = v + n, corrects tilt and gyro bias. Averaging thus happens in a frame that does not turn with the
 body, so that linear acceleration, which has no mean, hurts little.
 
-    q <- q (x) exp(w h),  w = gyro - b - C_nb' w_ie        phi' = -C_nb db
+    q <- integrated,  w = gyro - b - C_nb' w_ie             phi' = -C_nb db
     v <- v + h (C_nb f)_xy                                  dv_x' = phi_y f_z,  dv_y' = -phi_x f_z
 
 Error state: tilt phi_x, phi_y (navigation axes), velocity dv_x, dv_y, gyro bias db_x, db_y, db_z.
@@ -23,7 +23,6 @@ from typing import Annotated, Any, NamedTuple
 from ..record import Matrix3, Quaternion, Real, Vector3
 from ..scalar import Scalar, both, exp, minimum, where
 from ..vectors import add, dot, multiply, multiply_transposed, scale, subtract
-from .integration import turned
 from .rotations import earth_rate_n, matrix_from_quaternion, normalised, quaternion_product
 
 STATES = 7
@@ -36,7 +35,10 @@ Covariance = tuple[
 """Upper triangle of the symmetric 7x7, row by row."""
 
 VELOCITY_MEMORY = 5.0
-"""s over which the velocity met lately is averaged."""
+"""s over which the velocity met lately is averaged: assumption, longer than a swing of the hand."""
+
+_INITIAL_SPEED = 0.1
+"""m/s, standard deviation of the velocity at the end of an alignment: assumption, a body at rest but for trembling."""
 
 
 class FusionParameters(NamedTuple):
@@ -119,7 +121,7 @@ def initial_fusion(
 ) -> FusionState:
     """The filter at the end of an alignment that found `bias` with a standard `deviation`, sure within `doubt`."""
     tilt = a.initial_tilt * a.initial_tilt
-    speed = 0.1 * 0.1
+    speed = _INITIAL_SPEED * _INITIAL_SPEED
     variance = deviation * deviation
     diagonal = (tilt, tilt, speed, speed, variance, variance, variance)
     covariance: Any = tuple(diagonal[i] if i == j else 0.0 for i, j in _PAIRS)
@@ -194,14 +196,13 @@ def _measured(
     )
 
 
-def fused_step(fused: Fused, rate: Vector3, force: Vector3, a: FusionParameters, latitude: Scalar, h: Scalar) -> Fused:
-    """One sample of rate and specific force as read; the rate is taken as the mean since the sample before."""
+def corrected(fused: Fused, rate: Vector3, force: Vector3, a: FusionParameters, latitude: Scalar, h: Scalar) -> Fused:
+    """The solution corrected by a sample of rate and specific force as read, to which q_nb has been integrated."""
     q, bias, fusion = fused
-    earth = multiply_transposed(matrix_from_quaternion(q), earth_rate_n(latitude))
+    c_nb = matrix_from_quaternion(q)
+    earth = multiply_transposed(c_nb, earth_rate_n(latitude))
     known = add(bias, earth)
     turn = subtract(rate, known)
-    q = turned(q, scale(h, turn))
-    c_nb = matrix_from_quaternion(q)
     f_n = multiply(c_nb, force)
     v = fusion.velocity
     vx, vy = v[0] + h * f_n[0], v[1] + h * f_n[1]

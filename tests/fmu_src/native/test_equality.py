@@ -12,7 +12,7 @@ import every_kind
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmu_instance import EVERY_KIND, Instance
-from random_records import settable_near
+from random_records import FOLLOWING, settable_near
 from refused_calls import REFUSED
 
 from attitude_fmu.fmu_src.build import build
@@ -81,6 +81,7 @@ def _parameters(model: Model, case: int, chance: random.Random) -> Values:
             choice = _choice(leaf, case, place)
             centre = centres.get(leaf.name, leaf.start)
             found[leaf.name] = settable_near(leaf, centre, chance) if choice is None else choice
+            found[leaf.name] = found[FOLLOWING.get(leaf.name, leaf.name)]
         if _runs(model, found):
             return found
 

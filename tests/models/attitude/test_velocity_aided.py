@@ -10,14 +10,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from attitude_fmu.models.attitude import velocity_aided
+from attitude_fmu.models.attitude.integration import mean_rate
 from attitude_fmu.models.attitude.rotations import (
     STANDARD_GRAVITY,
     Euler,
     matrix_from_quaternion,
     quaternion_from_euler,
 )
-from attitude_fmu.models.attitude.velocity_aided import Fused, FusionParameters, RestState, fused_step, initial_fusion
-from attitude_fmu.models.vectors import ZERO3, multiply_transposed
+from attitude_fmu.models.attitude.velocity_aided import Fused, FusionParameters, RestState, corrected, initial_fusion
+from attitude_fmu.models.vectors import ZERO3, add, multiply_transposed, subtract
 
 STATES = velocity_aided.STATES
 DEFAULT = FusionParameters()
@@ -54,6 +55,14 @@ def test_update_is_the_kalman_filters(index: int) -> None:
     ours, state = velocity_aided._measured(p[np.triu_indices(STATES)].tolist(), x.tolist(), index, seen, variance)
     assert square(ours) == pytest.approx((np.eye(STATES) - np.outer(gain, h)) @ p, abs=1e-13)
     assert state == pytest.approx(x + gain * (seen - x[index]), abs=1e-13)
+
+
+def fused_step(fused: Fused, rate: Any, force: Any, parameters: FusionParameters, latitude: float, h: float) -> Fused:
+    """The solution integrated over a step in which the rate was this, and corrected."""
+    earth = multiply_transposed(matrix_from_quaternion(fused.q_nb), velocity_aided.earth_rate_n(latitude))
+    turning = subtract(rate, add(fused.bias, earth))
+    integrated = fused._replace(q_nb=mean_rate(fused.q_nb, ZERO3, turning, h))
+    return corrected(integrated, rate, force, parameters, latitude, h)
 
 
 def moved(attitude: Euler, seconds: float, rate: tuple[float, float, float], parameters: Any = DEFAULT) -> Fused:
