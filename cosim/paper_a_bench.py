@@ -121,6 +121,9 @@ OURS: dict[str, Value] = {
     "sensor.solver.fusion.rest_specific_force": 1.2,
     "sensor.solver.fusion.rest_bias": 3e-3,
     "sensor.solver.fusion.rest_time": 0.5,
+    # five times the gyros' noise: a move is seen within 0.1 s, before it is 0.05 deg
+    "sensor.solver.fusion.rest_rate": 0.014,
+    "sensor.solver.fusion.rest_rate_noise": 1e-3,
     # what the alignment's 3 s leave, and what the shaking is: DENSITY
     "sensor.solver.fusion.initial_tilt": math.radians(DENSITY) / math.sqrt(3.0),
     "sensor.solver.fusion.specific_force_noise": STANDARD_GRAVITY * math.radians(DENSITY),

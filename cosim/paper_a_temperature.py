@@ -136,12 +136,12 @@ CLAIMS = tuple(
 
 def draw(figure: Figure, cases: Cases) -> None:
     """The temperatures over time, and at each rest the error of the angle and of the rates."""
-    upper, lower = figure.subfigures(2, 1, height_ratios=(0.8, 1.0))
+    upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.8, 1.0))[:, 0]
     _temperatures(upper.subplots(), cases)
     angle, drift = lower.subplots(1, 2)
-    _rests(angle, "Error of the inner angle at each rest, 5 to 95 % of the pieces (deg)", "angles", cases)
-    _rests(drift, "Error of the rates, rms of three gyros (deg/s)", "drifts", cases)
-    drift.set_yscale("log")
+    _rests(angle, "Error of the inner angle, 5 to 95 % of the pieces (deg)", "angles", cases)
+    _rests(drift, "Error of the rates, rms of the gyros (deg/s)", "drifts", cases)
+    drift.set_ylim(bottom=0.0)
     figure.legend(*angle.get_legend_handles_labels(), loc="outside lower center", ncols=len(_NAMES))
 
 
@@ -153,7 +153,7 @@ def _temperatures(axes: Panel, cases: Cases) -> None:
     axes.plot(warm["time"], warm["die"], color=SLOW, label="accelerometer in the thermostat")
     axes.set_xlim(0.0, STOP)
     axes.set_xlabel("time (s)")
-    axes.legend(loc="lower left", ncols=3)
+    axes.legend(loc="center left", bbox_to_anchor=(0.0, 0.3))
 
 
 def _rests(axes: Panel, title: str, name: str, cases: Cases) -> None:

@@ -9,8 +9,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 
 from attitude_fmu.fmu_src.build_messages import build_and_tell
@@ -70,7 +79,7 @@ def _figures(chosen: Sequence[Experiment], out: Path, dist: Path) -> dict[str, F
 
 
 @contextmanager
-def _bar(total: int) -> Iterator[tuple[Progress, object]]:
+def _bar(total: int) -> Iterator[tuple[Progress, TaskID]]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     console = Console(stderr=True)
     with Progress(
@@ -89,28 +98,28 @@ def _bar(total: int) -> Iterator[tuple[Progress, object]]:
 
 def table(experiment: Experiment, found: Sequence[Finding]) -> Table:
     """Published numbers beside ours, a row for each claim."""
-    shown = Table(title=experiment.title, title_justify="left", title_style="bold")
+    shown = Table(title=experiment.title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=0)
     shown.add_column("")
-    for heading in ("published", "ours", "5-95 %", "", "best", "gain"):
-        shown.add_column(heading, justify="right")
+    for heading in ("paper", "ours", "5 to 95 %", "", "best", "gain"):
+        shown.add_column(heading, justify="right", no_wrap=True)
     for one in found:
         claim = one.claim
         shown.add_row(
-            f"{claim.what} [dim]({claim.source})[/dim]",
+            f"{claim.what}, {claim.unit}",
             _published(claim),
             _number(one.median),
-            f"{_number(one.low)} .. {_number(one.high)}",
-            f"[{_COLOURS[one.verdict]}]{one.verdict}[/]",
+            f"{_number(one.low)} {_number(one.high)}",
+            "" if claim.published is None else f"[{_COLOURS[one.verdict]}]{one.verdict}[/]",
             "" if one.best is None else _number(one.best),
-            "" if one.gain is None else f"{one.gain:.3g} x",
+            "" if one.gain is None else f"{one.gain:.3g}x" if one.gain < 999.5 else ">999x",
         )
     return shown
 
 
 def _published(claim: Claim) -> str:
     if claim.published is None:
-        return f"- {claim.unit}"
-    return f"{'≤ ' if claim.bound else ''}{_number(claim.published)} {claim.unit}"
+        return "-"
+    return f"{'≤ ' if claim.bound else ''}{claim.published:g}"
 
 
 def _number(value: float) -> str:

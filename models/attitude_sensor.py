@@ -131,14 +131,17 @@ class SupplyParameters(NamedTuple):
 
 
 class CompensationParameters(NamedTuple):
-    """What the processor takes out of the readings, with the parts' own thermometers: M (y - b - G f).
+    """What the processor takes out of the readings, with the parts' own thermometers: M diag(s)^-1 (y - b - G f).
 
-    b = b0 + b1 (T - 25 degC) + b2 (T - 25 degC)^2.
+    b = b0 + b1 (T - 25 degC) + b2 (T - 25 degC)^2,  s = 1 + k (T - 25 degC).
     """
 
     gyro_bias: Annotated[Vector3, Real("rad/s", "gyro bias taken out", display="deg/s")] = ZERO3
     gyro_bias_temperature_slope: Annotated[Vector3, Real("rad/(s.K)", "its change with temperature")] = ZERO3
     gyro_bias_temperature_curve: Annotated[Vector3, Real("rad/(s.K2)", "its change with temperature squared")] = ZERO3
+    gyro_scale_temperature_slope: Annotated[
+        Vector3, Real("1/K", "relative change of the gyros' sensitivity with temperature", min=-1e-3, max=1e-3)
+    ] = ZERO3
     gyro_matrix: Annotated[Matrix3, Real("1", "what the gyro readings are multiplied by")] = IDENTITY3
     g_sensitivity: Annotated[Matrix3, Real("rad.s/m", "gyro reading by specific force taken out")] = _NOTHING
     accelerometer_bias: Annotated[Vector3, Real("m/s2", "accelerometer bias taken out")] = ZERO3
@@ -147,6 +150,9 @@ class CompensationParameters(NamedTuple):
     ] = ZERO3
     accelerometer_bias_temperature_curve: Annotated[
         Vector3, Real("m/(s2.K2)", "change of the accelerometer bias with temperature squared")
+    ] = ZERO3
+    accelerometer_scale_temperature_slope: Annotated[
+        Vector3, Real("1/K", "relative change of the accelerometer's sensitivity with temperature", min=-1e-3, max=1e-3)
     ] = ZERO3
     accelerometer_matrix: Annotated[Matrix3, Real("1", "what the accelerometer readings are multiplied by")] = IDENTITY3
 
@@ -650,10 +656,18 @@ def _compensated(rate: Vector3, force: Vector3, slow: SlowState, p: Parameters) 
         slope, curve = c.gyro_bias_temperature_slope[i], c.gyro_bias_temperature_curve[i]
         return with_temperature(c.gyro_bias[i], slope, curve, gyro_temperature)
 
-    true_force = multiply(c.accelerometer_matrix, subtract(force, each_axis(part_bias)))
-    pushed = multiply(c.g_sensitivity, true_force)
-    true_rate = multiply(c.gyro_matrix, subtract(subtract(rate, each_axis(gyro_bias)), pushed))
+    unbiased = _at_reference_scale(
+        subtract(force, each_axis(part_bias)), c.accelerometer_scale_temperature_slope, part_temperature
+    )
+    true_force = multiply(c.accelerometer_matrix, unbiased)
+    unmoved = subtract(subtract(rate, each_axis(gyro_bias)), multiply(c.g_sensitivity, true_force))
+    true_rate = multiply(c.gyro_matrix, _at_reference_scale(unmoved, c.gyro_scale_temperature_slope, gyro_temperature))
     return _Read(true_rate, true_force)
+
+
+def _at_reference_scale(reading: Vector3, slope: Vector3, temperature: Scalar) -> Vector3:
+    """diag(1 + k (T - 25 degC))^-1 y; what a thermometer of no use reads is kept from the division."""
+    return each_axis(lambda i: reading[i] / maximum(1.0 + slope[i] * (temperature - REFERENCE_TEMPERATURE), 0.5))
 
 
 def _read(

@@ -11,8 +11,12 @@ Error state: tilt phi_x, phi_y (navigation axes), velocity dv_x, dv_y, gyro bias
 At rest, seen by both triads staying close to their low-passed selves, the velocity is known much better and the
 low-passed gyro is the bias. A slow steady turn looks the same, so rest is believed only while the mean rate stays near
 the bias found in the alignment, which the filter cannot move. The measurement noise grows with the velocity met
-lately, the tilt noise with the rate (scale and misalignment of real gyros). Own derivation; rest detection after
-Laidig & Seel, "VQF", 2023.
+lately, the tilt noise with the rate (scale and misalignment of real gyros).
+
+Three more statements can be made, and are not by default. `rest_tilt_noise`: a body at rest keeps its attitude, gyros
+are not integrated then; specific force is averaged without end, at the price of what a move turns before it is seen.
+`specific_force_noise`: shaking that is white, whose velocity is a random walk. `push_noise`: a knock leaves a velocity
+that is not known. Own derivation; rest detection after Laidig & Seel, "VQF", 2023.
 """
 
 from __future__ import annotations
