@@ -216,13 +216,15 @@ def _linearised(value: Array, axis: int, r: Readings) -> tuple[Array, Array]:
 
 def _variances(jacobian: Array, residual: Array, r: Readings) -> tuple[float, float]:
     """sigma^2 and tau^2: from what is left with a free bias for each switching-on, and what more is left without."""
-    levels, root = _levels(r), np.sqrt(r.duration)
-    j, y = root[:, None] * jacobian, root * residual
-    free, common = _basis(np.hstack((j, levels))), _basis(j)
-    spare = len(y) - free.shape[1]
+    levels, weight = _levels(r), np.sqrt(r.duration)
+    y, columns = weight * residual, weight[:, None] * jacobian / _lengths(jacobian)
+    means = levels / _lengths(levels)
+    within = _basis(columns - means @ (means.T @ columns))
+    spare = len(y) - means.shape[1] - within.shape[1]
     if spare < 1:
-        raise RecordUnusableError(f"{len(y)} intervals do not determine {free.shape[1]} coefficients and their errors")
-    noise = _rest(free, y) / spare
+        raise RecordUnusableError(f"{len(y)} intervals do not determine {len(y) - spare} coefficients and their errors")
+    noise = _rest(within, y - means @ (means.T @ y)) / spare
+    common = _basis(columns)
     total = float(np.sum(levels**2))
     shared = total - float(np.sum((common.T @ levels) ** 2))
     if shared < 1e-9 * total:
@@ -240,7 +242,7 @@ def _levels(r: Readings) -> Array:
 
 def _basis(a: Array) -> Array:
     """Orthonormal columns that span those of `a` (n, m)."""
-    u, s, _ = np.linalg.svd(a / _lengths(a), full_matrices=False)
+    u, s, _ = np.linalg.svd(a, full_matrices=False)
     spanning: Array = u[:, s > 1e-10 * s[0]]
     return spanning
 
@@ -277,8 +279,3 @@ def _solved(jacobian: Array, residual: Array, r: Readings, noise: float, scatter
     step = vt.T @ ((u.T @ whitened[:, -1]) / s) / length
     error = math.sqrt(noise) * np.sqrt(np.sum((vt / s[:, None]) ** 2, axis=0)) / length
     return step, error, condition
-
-
-def merged(parts: list[Readings]) -> Readings:
-    """Several runs' readings as one."""
-    return Readings(*[np.concatenate(columns) for columns in zip(*parts, strict=True)])

@@ -142,6 +142,12 @@ def other_axis(angle: str) -> str:
     return TABLE_AXIS["roll" if angle == "pitch" else "pitch"]
 
 
+def recorded(angle: str) -> tuple[str, ...]:
+    """What a run of one table records: the angle as solved and as the table tells it, and where the profile is."""
+    axis = f"table.axis_angle.{TABLE_AXIS[angle]}"
+    return f"sensor.euler.{angle}", axis, "table.row", "table.resting", "table.turning"
+
+
 def calibrated(seed: int) -> Mapping[str, float]:
     """The processor's compensation of a piece that was calibrated in the room where it is tested."""
     return known_compensation(DEVICE, seed, ROOM_TEMPERATURE, by_temperature=False)

@@ -34,6 +34,7 @@ from .paper_b_bench import (
     beside,
     calibrated,
     other_axis,
+    recorded,
 )
 from .paper_b_bench import OURS as OUR_WAY
 from .profiles import PAPER_B_PITCH, PAPER_B_ROLL, Profile, labelled_intervals
@@ -75,7 +76,7 @@ def figures_of(results: Results, profile: Profile, angle: str) -> Mapping[str, A
     }
 
 
-def trial(dist: Path, angle: str, settings: Mapping[str, Value], ours: bool, seed: int) -> Trial:
+def trial(dist: Path, angle: str, settings: Mapping[str, Value], is_calibrated: bool, seed: int) -> Trial:
     """A run of one table."""
     profile, fixed = _PROFILES[angle], other_axis(angle)
     table: dict[str, Value] = {
@@ -85,16 +86,10 @@ def trial(dist: Path, angle: str, settings: Mapping[str, Value], ours: bool, see
     }
     return Trial(
         "static",
-        bench(dist, profile, seed, table, settings, calibrated(seed) if ours else {}),
+        bench(dist, profile, seed, table, settings, calibrated(seed) if is_calibrated else {}),
         partial(figures_of, profile=profile, angle=angle),
         _STOP,
-        record=(
-            f"sensor.euler.{angle}",
-            f"table.axis_angle.{TABLE_AXIS[angle]}",
-            "table.row",
-            "table.resting",
-            "table.turning",
-        ),
+        record=recorded(angle),
         step=STEP,
         interval=INTERVAL,
         order=ORDER,
@@ -104,9 +99,9 @@ def trial(dist: Path, angle: str, settings: Mapping[str, Value], ours: bool, see
 def cases(dist: Path) -> tuple[Case, ...]:
     """Both tables, the paper's way and ours."""
     return tuple(
-        Case(f"{angle}{suffix}", partial(trial, dist, angle, settings, ours), SEEDS)
+        Case(f"{angle}{suffix}", partial(trial, dist, angle, settings, is_calibrated), SEEDS)
         for angle in ("pitch", "roll")
-        for suffix, settings, ours in (("", LEVELLED, False), ("-ours", OUR_WAY, True))
+        for suffix, settings, is_calibrated in (("", LEVELLED, False), ("-ours", OUR_WAY, True))
     )
 
 

@@ -40,6 +40,7 @@ from .paper_b_bench import (
     beside,
     calibrated,
     other_axis,
+    recorded,
 )
 from .paper_b_bench import OURS as OUR_WAY
 from .profiles import PAPER_B_PITCH_TURNS, PAPER_B_ROLL_TURNS, Profile, labelled_intervals
@@ -88,22 +89,16 @@ def figures_of(results: Results, profile: Profile, angle: str) -> Mapping[str, A
     }
 
 
-def trial(dist: Path, angle: str, settings: Mapping[str, Value], ours: bool, seed: int) -> Trial:
+def trial(dist: Path, angle: str, settings: Mapping[str, Value], is_calibrated: bool, seed: int) -> Trial:
     """A run of one table."""
     profile = _PROFILES[angle]
     table: dict[str, Value] = {f"table.axis.{other_axis(angle)}.initial_angle": BESIDE * PI / 180.0}
     return Trial(
         "turns",
-        bench(dist, profile, seed, table, settings, calibrated(seed) if ours else {}),
+        bench(dist, profile, seed, table, settings, calibrated(seed) if is_calibrated else {}),
         partial(figures_of, profile=profile, angle=angle),
         _STOP,
-        record=(
-            f"sensor.euler.{angle}",
-            f"table.axis_angle.{TABLE_AXIS[angle]}",
-            "table.row",
-            "table.resting",
-            "table.turning",
-        ),
+        record=recorded(angle),
         step=STEP,
         interval=INTERVAL,
         order=ORDER,
@@ -120,9 +115,9 @@ _WAYS: tuple[tuple[str, Mapping[str, Value], bool], ...] = (
 def cases(dist: Path) -> tuple[Case, ...]:
     """Both tables: the paper's way, ours with the gyros alone, and ours with the accelerometer."""
     return tuple(
-        Case(f"{angle}{suffix}", partial(trial, dist, angle, settings, ours), SEEDS)
+        Case(f"{angle}{suffix}", partial(trial, dist, angle, settings, is_calibrated), SEEDS)
         for angle in ("pitch", "roll")
-        for suffix, settings, ours in _WAYS
+        for suffix, settings, is_calibrated in _WAYS
     )
 
 
