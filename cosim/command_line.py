@@ -316,7 +316,7 @@ and trials (every run, from which an interrupted command goes on).
 
   attitude-fmu calibrate --device ADIS16354_150 --quick
 
-  attitude-fmu calibrate --set accelerometer.turn_on_bias=0.005 --set accelerometer.hysteresis=0.01
+  attitude-fmu calibrate --set accelerometer.turn_on_bias=0.005
 """
 
 

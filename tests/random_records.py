@@ -6,7 +6,18 @@ import random
 from typing import Any
 
 from attitude_fmu.models.errors import ValueRefusedError
-from attitude_fmu.models.record import Boolean, Enumeration, Integer, Leaf, Real, defaults, flatten, leaves, unflatten
+from attitude_fmu.models.record import (
+    Boolean,
+    Enumeration,
+    Integer,
+    Leaf,
+    Real,
+    check,
+    defaults,
+    flatten,
+    leaves,
+    unflatten,
+)
 from attitude_fmu.models.system import Model, check_rules
 
 COUNTERS = {
@@ -76,11 +87,24 @@ def bits(values: list[float]) -> list[str]:
     return [float(value).hex() for value in values]
 
 
+def reconciled(model: Model, parameters: list[float]) -> list[float]:
+    """The parameters, those that a rule refuses back at their start values or as near to them as the rule lets them."""
+    found = list(parameters)
+    places = {leaf.name: (place, leaf.start) for place, leaf in enumerate(leaves(model.Parameters))}
+    for rule in model.rules:
+        low, high = rule.limits(unflatten(model.Parameters, found))
+        place, start = places[rule.field]
+        if not low <= found[place] <= high:
+            found[place] = min(max(start, low), high)
+    return found
+
+
 def legal_parameters(model: Model, chance: random.Random) -> list[float]:
     """Random parameters that go together."""
     while True:
-        parameters = points_near(model.Parameters, defaults(model.Parameters), chance)
+        parameters = reconciled(model, points_near(model.Parameters, defaults(model.Parameters), chance))
         try:
+            check(model.Parameters, parameters, model.name)
             check_rules(model, unflatten(model.Parameters, parameters), model.name)
         except ValueRefusedError:
             continue
