@@ -272,6 +272,90 @@ def sensor_command(
         show_sensor(SensorRequest(device, out, quick, specimen, settings, dist))
 
 
+REPRODUCE_HELP = """Run the experiments of the two papers again, and lay what they print beside what comes out.
+
+PAPER is [bold]paper-a[/bold] (Jing & Gao 2021: three ADXRS450 and an ADXL355 on a turntable), [bold]paper-b[/bold] \
+(2010: an ADIS16354) or [bold]all[/bold]. Each experiment is the sensor on the turntable, run over many seeds: the \
+paper's own way, and ours. A printed number is inside when 5 to 95 % of the seeds enclose it.
+
+Written into the output folder: a picture for each experiment, paper-a.csv and paper-b.csv (the tables that are \
+shown), and trials (the figures of every run, from which an interrupted command goes on).
+
+[bold]Examples[/bold]
+
+  attitude-fmu reproduce
+
+  attitude-fmu reproduce paper-a --out papers
+"""
+
+Paper = Literal["paper-a", "paper-b", "all"]
+
+
+@application.command("reproduce", help=REPRODUCE_HELP, no_args_is_help=False)
+def reproduce_command(
+    paper: Annotated[Paper, typer.Argument(help="Whose experiments.", metavar="PAPER")] = "all",
+    out: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder for tables and pictures; made if missing.")
+    ] = Path("out"),
+    dist: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder of the FMUs, which are built where missing or stale.")
+    ] = Path("dist"),
+) -> None:
+    """Run the experiments of the two papers again."""
+    with _reported():
+        from .reproduce import reproduce
+
+        reproduce(paper, out, dist)
+
+
+CALIBRATE_HELP = """Calibrate one piece of a device on the turntable, and show what that gains.
+
+At eight temperatures from -5 to 65 degC, switched on twice at each, the table turns 26 directions of the sensor up \
+and spins it about its axes. Scale, misalignment, g-sensitivity and bias are fitted to the readings, scale and bias \
+with their change with temperature. Then the piece is verified, before and after, at other angles and temperatures.
+
+Written into the output folder: \
+calibration.ssv (the values for the sensor's processor), \
+calibration.csv (every coefficient: true, fitted, standard error), \
+residuals.csv and calibration.png (the errors before and after), \
+and trials (every run, from which an interrupted command goes on).
+
+[bold]Examples[/bold]
+
+  attitude-fmu calibrate --specimen 7 --out piece_7
+
+  attitude-fmu calibrate --device ADIS16354_150 --quick
+
+  attitude-fmu calibrate --set accelerometer.turn_on_bias=0.005
+"""
+
+
+@application.command("calibrate", help=CALIBRATE_HELP, no_args_is_help=False)
+def calibrate_command(
+    device: Annotated[
+        str, typer.Option(metavar="DEVICE", help="The device, for instance ADXRS453_ADXL355.")
+    ] = "ADXRS450_ADXL355",
+    specimen: Annotated[int, typer.Option(metavar="N", min=0, help=_SPECIMEN_HELP)] = 1,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for what is written; made if missing.")] = Path(
+        "out"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="Half the temperatures, switched on once at each.")] = False,
+    values: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the sensor, in SI units. Repeatable."),
+    ] = None,
+    dist: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder of the FMUs, which are built where missing or stale.")
+    ] = Path("dist"),
+) -> None:
+    """Calibrate one piece of a device on the turntable."""
+    with _reported():
+        from .calibrate import CalibrationRequest, calibrate
+
+        settings = _settings(values or [], "write it as parameter=value, for instance seed=7", dotted=False)
+        calibrate(CalibrationRequest(device, specimen, out, dist, quick, settings))
+
+
 def _show_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"attitude-fmu {version('attitude-fmu')}")

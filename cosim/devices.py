@@ -7,6 +7,7 @@ sets override single numbers. A set without component, ``component=""``, has the
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from attitude_fmu.fmu_src.errors import did_you_mean
@@ -16,7 +17,7 @@ from ..models.attitude_sensor import MODEL
 from ..models.record import Boolean, Enumeration, Fact, Integer, leaves
 from ..models.sensors.devices import DEVICES, parameters
 from .errors import SystemRefusedError
-from .interface import Interface, Item, Unit, Variable
+from .interface import Interface, Item, Unit, Value, Variable
 from .ssp import write_ssv
 from .system import ParameterSet
 
@@ -27,10 +28,15 @@ def device_parameters(device: str, specimen: int = 0, component: str = "sensor")
     Raises `SystemRefusedError` for a device that there is not, `UnknownDeviceError` for such a specimen.
     """
     known_device(device)
+    name = f"{device}_specimen_{specimen}" if specimen else device
+    return sensor_parameters(name, parameters(device, specimen), component)
+
+
+def sensor_parameters(name: str, values: Mapping[str, Value], component: str = "sensor") -> ParameterSet:
+    """Parameters of the attitude sensor as a set for the one that is called `component`, with their units."""
     prefix = f"{component}." if component else ""
-    values = {f"{prefix}{name}": value for name, value in parameters(device, specimen).items()}
-    units = {f"{prefix}{name}": unit for name, unit in _units().items() if f"{prefix}{name}" in values}
-    return ParameterSet(f"{device}_specimen_{specimen}" if specimen else device, values, units)
+    units = {f"{prefix}{key}": unit for key, unit in _units().items() if key in values}
+    return ParameterSet(name, {f"{prefix}{key}": value for key, value in values.items()}, units)
 
 
 def known_device(device: str) -> None:
@@ -45,9 +51,16 @@ def write_device(path: Path, device: str, specimen: int = 0, component: str = "s
 
     Raises `ResultsError` if the file cannot be written.
     """
+    return write_sensor_parameters(path, device_parameters(device, specimen, component), component)
+
+
+def write_sensor_parameters(path: Path, parameters: ParameterSet, component: str = "sensor") -> Path:
+    """Write what `sensor_parameters` gave for this `component` as an ``.ssv`` file.
+
+    Raises `ResultsError` if the file cannot be written.
+    """
     variables = {name: _variable(name, fact) for name, fact in _facts().items()}
-    interface = Interface(MODEL.name, variables, {}, None)
-    return write_ssv(device_parameters(device, specimen, component), path, {component: interface})
+    return write_ssv(parameters, path, {component: Interface(MODEL.name, variables, {}, None)})
 
 
 def _facts() -> dict[str, Fact]:

@@ -103,7 +103,9 @@ _PLANT = (
     "plant.rate*",
     "plant.specific_force*",
     "plant.joint.*",
+    "plant.motor_current.*",
     "plant.tripod_deflection.*",
+    "plant.head_deflection.*",
     "plant.wind_speed",
 )
 

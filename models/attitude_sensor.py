@@ -30,7 +30,16 @@ from .attitude.rotations import (
     matrix_from_euler,
     matrix_from_quaternion,
 )
-from .attitude.velocity_aided import Fused, FusionParameters, FusionState, RestState, corrected, initial_fusion
+from .attitude.velocity_aided import (
+    Fused,
+    FusionParameters,
+    FusionState,
+    RestState,
+    corrected,
+    initial_fusion,
+    is_held,
+    with_rest,
+)
 from .filters.ar1_kalman import Ar1KalmanParameters, Ar1KalmanState, ar1_kalman_step, initial_ar1_kalman
 from .filters.kalman import KalmanParameters, kalman_filtered
 from .filters.rc import RcParameters, rc_filtered
@@ -135,14 +144,17 @@ class SupplyParameters(NamedTuple):
 
 
 class CompensationParameters(NamedTuple):
-    """What the processor takes out of the readings, with the parts' own thermometers: M (y - b - G f).
+    """What the processor takes out of the readings, with the parts' own thermometers: M diag(s)^-1 (y - b - G f).
 
-    b = b0 + b1 (T - 25 degC) + b2 (T - 25 degC)^2.
+    b = b0 + b1 (T - 25 degC) + b2 (T - 25 degC)^2,  s = 1 + k (T - 25 degC).
     """
 
     gyro_bias: Annotated[Vector3, Real("rad/s", "gyro bias taken out", display="deg/s")] = ZERO3
     gyro_bias_temperature_slope: Annotated[Vector3, Real("rad/(s.K)", "its change with temperature")] = ZERO3
     gyro_bias_temperature_curve: Annotated[Vector3, Real("rad/(s.K2)", "its change with temperature squared")] = ZERO3
+    gyro_scale_temperature_slope: Annotated[
+        Vector3, Real("1/K", "relative change of the gyros' sensitivity with temperature", min=-1e-3, max=1e-3)
+    ] = ZERO3
     gyro_matrix: Annotated[Matrix3, Real("1", "what the gyro readings are multiplied by")] = IDENTITY3
     g_sensitivity: Annotated[Matrix3, Real("rad.s/m", "gyro reading by specific force taken out")] = _NOTHING
     accelerometer_bias: Annotated[Vector3, Real("m/s2", "accelerometer bias taken out")] = ZERO3
@@ -151,6 +163,9 @@ class CompensationParameters(NamedTuple):
     ] = ZERO3
     accelerometer_bias_temperature_curve: Annotated[
         Vector3, Real("m/(s2.K2)", "change of the accelerometer bias with temperature squared")
+    ] = ZERO3
+    accelerometer_scale_temperature_slope: Annotated[
+        Vector3, Real("1/K", "relative change of the accelerometer's sensitivity with temperature", min=-1e-3, max=1e-3)
     ] = ZERO3
     accelerometer_matrix: Annotated[Matrix3, Real("1", "what the accelerometer readings are multiplied by")] = IDENTITY3
 
@@ -662,10 +677,18 @@ def _compensated(rate: Vector3, force: Vector3, slow: SlowState, p: Parameters) 
         slope, curve = c.gyro_bias_temperature_slope[i], c.gyro_bias_temperature_curve[i]
         return with_temperature(c.gyro_bias[i], slope, curve, gyro_temperature)
 
-    true_force = multiply(c.accelerometer_matrix, subtract(force, each_axis(part_bias)))
-    pushed = multiply(c.g_sensitivity, true_force)
-    true_rate = multiply(c.gyro_matrix, subtract(subtract(rate, each_axis(gyro_bias)), pushed))
+    unbiased = _at_reference_scale(
+        subtract(force, each_axis(part_bias)), c.accelerometer_scale_temperature_slope, part_temperature
+    )
+    true_force = multiply(c.accelerometer_matrix, unbiased)
+    unmoved = subtract(subtract(rate, each_axis(gyro_bias)), multiply(c.g_sensitivity, true_force))
+    true_rate = multiply(c.gyro_matrix, _at_reference_scale(unmoved, c.gyro_scale_temperature_slope, gyro_temperature))
     return _Read(true_rate, true_force)
+
+
+def _at_reference_scale(reading: Vector3, slope: Vector3, temperature: Scalar) -> Vector3:
+    """diag(1 + k (T - 25 degC))^-1 y; what a thermometer of no use reads is kept from the division."""
+    return each_axis(lambda i: reading[i] / maximum(1.0 + slope[i] * (temperature - REFERENCE_TEMPERATURE), 0.5))
 
 
 def _read(
@@ -812,6 +835,14 @@ def _aligning(
     return _Start(q_nb, choose(done > 0.5, nulled, ZERO3), fused, watched), done
 
 
+def _look_for_rest(state: State, _inputs: Inputs, p: Parameters, _k: Coefficients, _draws: tuple[Any, ...]) -> State:
+    attitude, signal = state.attitude, state.signal
+    rate, force = signal.rate.estimate, signal.specific_force.estimate
+    a, h = p.solver.fusion, p.processor.period
+    fusion = with_rest(attitude.fusion, attitude.q_nb, rate, force, a, p.latitude, h)
+    return State(*state[:5], attitude._replace(fusion=fusion), *state[6:])
+
+
 def _integration(integrate: Integrator) -> TaskStep:
     """The attitude goes on by the rates of the last two readings; the solver has the last word on it."""
 
@@ -820,7 +851,8 @@ def _integration(integrate: Integrator) -> TaskStep:
         earth = multiply_transposed(matrix_from_quaternion(attitude.q_nb), earth_rate_n(p.latitude))
         known = add(attitude.bias, earth)
         before, now = subtract(attitude.rate_before, known), subtract(state.signal.rate.estimate, known)
-        q_nb = integrate(attitude.q_nb, before, now, p.processor.period)
+        held = both(p.solver.kind == SOLVER.value("fused"), is_held(attitude.fusion, p.solver.fusion))
+        q_nb = choose(held, attitude.q_nb, integrate(attitude.q_nb, before, now, p.processor.period))
         return State(*state[:5], attitude._replace(q_nb=q_nb), *state[6:])
 
     return step
@@ -1092,6 +1124,7 @@ MODEL = Model(
             },
             choice=lambda p: p.signal_filter.kind,
         ),
+        Task("rest", "processor", {SOLVER.value("fused"): _look_for_rest}, choice=lambda p: p.solver.kind),
         Task(
             "integrate",
             "processor",

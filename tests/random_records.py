@@ -7,13 +7,29 @@ import random
 from typing import Any
 
 from attitude_fmu.models.errors import ValueRefusedError
-from attitude_fmu.models.record import Boolean, Enumeration, Integer, Leaf, Real, defaults, flatten, leaves, unflatten
+from attitude_fmu.models.record import (
+    Boolean,
+    Enumeration,
+    Integer,
+    Leaf,
+    Real,
+    check,
+    defaults,
+    flatten,
+    leaves,
+    unflatten,
+)
 from attitude_fmu.models.system import Model, check_rules
 
 COUNTERS = {
     "ticks": (0, 1, 7, 4999, 5001, 5008, 5012, 5063, 9998, 10_003, 123_456),
     "wind.calls": (0, 1, 500),
     "engaged": (0, 1),
+    "sequence.row": (0, 1, 3, 4, 47, 48, 49),
+    "sequence.left": (0, 0, 1, 500),
+    "sequence.ends": (0, 0, 1),
+    "steady": (0, 1),
+    "shock.pulses": (1, 1, 3),
     "attitude.alignment.sums.samples": (0, 10, 999, 1000, 1001),
     "attitude.fusion.rest.quiet": (0.0, 1.0, 1.6, 4.0),
     "accelerometer.samples": (0, 4, 5, 7),
@@ -30,9 +46,6 @@ COUNTERS = {
 }
 """Values that reach every branch: start, shutter and knock, end of the alignment, rest, a due word, silence, faults,
 and the ranges that every part has."""
-
-FOLLOWING = {"accelerometer.filter": "gyro.filter", "accelerometer.divider": "gyro.divider"}
-"""Parameters that have to be what others are."""
 
 NEVER_WILD = ("attitude.q_nb", "attitude.fusion.covariance")
 """What no run can bring to zero or to a hundred times itself."""
@@ -77,14 +90,24 @@ def bits(values: list[float]) -> list[str]:
     return [float(value).hex() for value in values]
 
 
+def reconciled(model: Model, parameters: list[float]) -> list[float]:
+    """The parameters, those that a rule refuses back at their start values or as near to them as the rule lets them."""
+    found = list(parameters)
+    places = {leaf.name: (place, leaf.start) for place, leaf in enumerate(leaves(model.Parameters))}
+    for rule in model.rules:
+        low, high = rule.limits(unflatten(model.Parameters, found))
+        place, start = places[rule.field]
+        if not low <= found[place] <= high:
+            found[place] = min(max(start, low), high)
+    return found
+
+
 def legal_parameters(model: Model, chance: random.Random) -> list[float]:
     """Random parameters that go together."""
-    names = [leaf.name for leaf in leaves(model.Parameters)]
     while True:
-        parameters = points_near(model.Parameters, defaults(model.Parameters), chance)
-        found = dict(zip(names, parameters, strict=True))
-        parameters = [found[FOLLOWING.get(name, name)] for name in names]
+        parameters = reconciled(model, points_near(model.Parameters, defaults(model.Parameters), chance))
         try:
+            check(model.Parameters, parameters, model.name)
             check_rules(model, unflatten(model.Parameters, parameters), model.name)
         except ValueRefusedError:
             continue

@@ -11,8 +11,12 @@ Error state: tilt phi_x, phi_y (navigation axes), velocity dv_x, dv_y, gyro bias
 At rest, seen by both triads staying close to their low-passed selves, the velocity is known much better and the
 low-passed gyro is the bias. A slow steady turn looks the same, so rest is believed only while the mean rate stays near
 the bias found in the alignment, which the filter cannot move. The measurement noise grows with the velocity met
-lately, the tilt noise with the rate (scale and misalignment of real gyros). Own derivation; rest detection after
-Laidig & Seel, "VQF", 2023.
+lately, the tilt noise with the rate (scale and misalignment of real gyros).
+
+Three more statements can be made, and are not by default. `rest_tilt_noise`: a body at rest keeps its attitude, gyros
+are not integrated then; specific force is averaged without end, at the price of what a move turns before it is seen.
+`specific_force_noise`: shaking that is white, whose velocity is a random walk. `push_noise`: a knock leaves a velocity
+that is not known. Own derivation; rest detection after Laidig & Seel, "VQF", 2023.
 """
 
 from __future__ import annotations
@@ -20,9 +24,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
-from ..record import Matrix3, Quaternion, Real, Vector3
+from ..record import Matrix3, Quaternion, Real, Vector3, choose
 from ..scalar import Scalar, both, exp, minimum, where
-from ..vectors import add, dot, multiply, multiply_transposed, scale, subtract
+from ..vectors import ZERO3, add, dot, multiply, multiply_transposed, scale, subtract
 from .rotations import earth_rate_n, matrix_from_quaternion, normalised, quaternion_product
 
 STATES = 7
@@ -57,6 +61,24 @@ class FusionParameters(NamedTuple):
     initial_tilt: Annotated[
         float, Real("rad", "standard deviation of the tilt at the start", min=1e-9, display="deg")
     ] = 0.005
+    specific_force_noise: Annotated[
+        float,
+        Real(
+            "m/s^1.5",
+            "white noise of the specific force beyond bounded velocity: a bench that shakes",
+            0.0,
+            tunable=True,
+        ),
+    ] = 0.0
+    push_noise: Annotated[
+        float,
+        Real(
+            "s^0.5",
+            "further noise by m/s2 away from the mean specific force, unless at rest: knocks",
+            0.0,
+            tunable=True,
+        ),
+    ] = 0.0
     velocity_bound: Annotated[
         float, Real("m/s^0.5", "noise of the statement that velocity is zero", min=1e-6, tunable=True)
     ] = 1.05
@@ -87,6 +109,15 @@ class FusionParameters(NamedTuple):
     ] = 0.5
     rest_time: Annotated[float, Real("s", "time of quiet after which it is rest", min=0.0, tunable=True)] = 1.5
     rest_memory: Annotated[float, Real("s", "time constant of those means", min=1e-3, tunable=True)] = 0.5
+    rest_tilt_noise: Annotated[
+        float,
+        Real(
+            "rad/s^0.5",
+            "random walk of the attitude at rest, which is held then; 0: gyros are integrated at rest too",
+            min=0.0,
+            tunable=True,
+        ),
+    ] = 0.0
 
 
 class RestState(NamedTuple):
@@ -152,22 +183,25 @@ def _row(p: Triangle, index: int) -> list[Scalar]:
     return [p[n] for n in _ROW[index]]
 
 
-def _predicted(p: Triangle, c_nb: Matrix3, f_up: Scalar, h: Scalar) -> list[Scalar]:
-    """Upper triangle of F P F' with F = I + h A: first the changed rows of G = F P, then G F'."""
+def _predicted(p: Triangle, c_nb: Matrix3, f_up: Scalar, h: Scalar, free: Scalar) -> list[Scalar]:
+    """Upper triangle of F P F' with F = I + h A: first the changed rows of G = F P, then G F'.
+
+    Of the h seconds the gyros, and with them their bias, turn the attitude for `free`.
+    """
     phi_x, phi_y, v_x, v_y, b_x, b_y, b_z = [_row(p, index) for index in range(STATES)]
     (xx, xy, xz), (yx, yy, yz), _ = c_nb
     push = h * f_up
-    g0 = [a - h * (xx * u + xy * v + xz * w) for a, u, v, w in zip(phi_x, b_x, b_y, b_z, strict=True)]
-    g1 = [a - h * (yx * u + yy * v + yz * w) for a, u, v, w in zip(phi_y, b_x, b_y, b_z, strict=True)]
+    g0 = [a - free * (xx * u + xy * v + xz * w) for a, u, v, w in zip(phi_x, b_x, b_y, b_z, strict=True)]
+    g1 = [a - free * (yx * u + yy * v + yz * w) for a, u, v, w in zip(phi_y, b_x, b_y, b_z, strict=True)]
     g2 = [a + push * b for a, b in zip(v_x, phi_y, strict=True)]
     g3 = [a - push * b for a, b in zip(v_y, phi_x, strict=True)]
     return [
-        g0[0] - h * (xx * g0[4] + xy * g0[5] + xz * g0[6]),
-        g0[1] - h * (yx * g0[4] + yy * g0[5] + yz * g0[6]),
+        g0[0] - free * (xx * g0[4] + xy * g0[5] + xz * g0[6]),
+        g0[1] - free * (yx * g0[4] + yy * g0[5] + yz * g0[6]),
         g0[2] + push * g0[1],
         g0[3] - push * g0[0],
         *g0[4:],
-        g1[1] - h * (yx * g1[4] + yy * g1[5] + yz * g1[6]),
+        g1[1] - free * (yx * g1[4] + yy * g1[5] + yz * g1[6]),
         g1[2] + push * g1[1],
         g1[3] - push * g1[0],
         *g1[4:],
@@ -196,27 +230,49 @@ def _measured(
     )
 
 
+def with_rest(
+    fusion: FusionState,
+    q_nb: Quaternion,
+    rate: Vector3,
+    force: Vector3,
+    a: FusionParameters,
+    latitude: Scalar,
+    h: Scalar,
+) -> FusionState:
+    """The filter's state that has looked for rest in a sample, before the attitude is integrated to it."""
+    earth = multiply_transposed(matrix_from_quaternion(q_nb), earth_rate_n(latitude))
+    return fusion._replace(rest=_rest_after(fusion, rate, force, add(fusion.anchor, earth), a, h))
+
+
+def is_held(fusion: FusionState, a: FusionParameters) -> Scalar:
+    """Whether the attitude is held instead of integrated: at rest, where rest is to count as knowledge."""
+    return both(fusion.rest.quiet > a.rest_time, a.rest_tilt_noise > 0.0)
+
+
 def corrected(fused: Fused, rate: Vector3, force: Vector3, a: FusionParameters, latitude: Scalar, h: Scalar) -> Fused:
-    """The solution corrected by a sample of rate and specific force as read, to which q_nb has been integrated."""
+    """The solution corrected by a sample as read, to which q_nb has been integrated, after `with_rest`."""
     q, bias, fusion = fused
     c_nb = matrix_from_quaternion(q)
     earth = multiply_transposed(c_nb, earth_rate_n(latitude))
     known = add(bias, earth)
-    turn = subtract(rate, known)
+    rest = fusion.rest
+    resting, held = rest.quiet > a.rest_time, is_held(fusion, a)
+    turn = choose(held, ZERO3, subtract(rate, known))
     f_n = multiply(c_nb, force)
     v = fusion.velocity
     vx, vy = v[0] + h * f_n[0], v[1] + h * f_n[1]
     memory = 1.0 - exp(-h / VELOCITY_MEMORY)
     lately = fusion.mean_square_velocity + memory * (vx * vx + vy * vy - fusion.mean_square_velocity)
-    rest = _rest_after(fusion, rate, force, add(fusion.anchor, earth), a, h)
-    resting = rest.quiet > a.rest_time
 
-    p = _predicted(fusion.covariance, c_nb, f_n[2], h)
-    tilt_noise = h * (a.gyro_noise * a.gyro_noise + a.rate_noise * a.rate_noise * dot(turn, turn))
+    p = _predicted(fusion.covariance, c_nb, f_n[2], h, where(held, 0.0, h))
+    white = where(held, a.rest_tilt_noise, a.gyro_noise)
+    tilt_noise = h * (white * white + a.rate_noise * a.rate_noise * dot(turn, turn))
+    pushed = subtract(force, rest.specific_force)
+    push = where(resting, 0.0, a.push_noise * a.push_noise * dot(pushed, pushed))
+    force_noise = h * (a.specific_force_noise * a.specific_force_noise + push)
     bias_noise = h * a.bias_walk * a.bias_walk
-    for index, noise in zip(
-        range(STATES), (tilt_noise, tilt_noise, 0.0, 0.0, bias_noise, bias_noise, bias_noise), strict=True
-    ):
+    noises = (tilt_noise, tilt_noise, force_noise, force_noise, bias_noise, bias_noise, bias_noise)
+    for index, noise in enumerate(noises):
         p[_ROW[index][index]] = p[_ROW[index][index]] + noise
 
     bound = a.velocity_bound * a.velocity_bound * (1.0 + a.velocity_adaptation * lately) / h

@@ -12,7 +12,7 @@ import every_kind
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmu_instance import EVERY_KIND, Instance
-from random_records import FOLLOWING, settable_near
+from random_records import reconciled, settable_near
 from refused_calls import REFUSED
 
 from attitude_fmu.fmu_src.build import build
@@ -39,7 +39,27 @@ STEPS: tuple[tuple[int, Callable[[random.Random], float]], ...] = (
 
 SOONER: dict[str, Values] = {
     "AttitudeSensor": {"alignment.duration": 0.03, "solver.fusion.rest_time": 0.05, "filter.divider": 3},
-    "TripodGimbal": {"shutter.start": 0.02, "shutter.period": 0.15, "knock.start": 0.05},
+    "TripodGimbal": {
+        "shutter.start": 0.02,
+        "shutter.period": 0.15,
+        "press.force": 2.0,
+        "press.start": 0.02,
+        "knock.start": 0.05,
+    },
+    "Turntable": {
+        **{f"profile.row[{row}].duration": 0.02 for row in (1, 2, 3)},
+        **{
+            f"axis.{axis}.{limit}_limit": 50.0
+            for axis in ("outer", "middle", "inner")
+            for limit in ("rate", "acceleration")
+        },
+        **{f"{noise}.rms[{axis}]": 0.01 for noise in ("tilt", "shaking") for axis in (1, 2, 3)},
+        "profile.tolerance": 0.01,
+        "shock.start": 0.02,
+        "shock.peak[1]": 5.0,
+        "shock.pulses": 3,
+        "shock.period": 0.05,
+    },
 }
 """Centres of random parameters with which everything comes up within a short run, in every other case."""
 
@@ -81,7 +101,7 @@ def _parameters(model: Model, case: int, chance: random.Random) -> Values:
             choice = _choice(leaf, case, place)
             centre = centres.get(leaf.name, leaf.start)
             found[leaf.name] = settable_near(leaf, centre, chance) if choice is None else choice
-            found[leaf.name] = found[FOLLOWING.get(leaf.name, leaf.name)]
+        found = dict(zip(found, reconciled(model, list(found.values())), strict=True))
         if _runs(model, found):
             return found
 

@@ -157,13 +157,14 @@ ERRORS: dict[str, Any] = {
     "bias": (0.01, -0.02, 0.03),
     "bias_temperature_slope": (1e-4, 2e-4, -3e-4),
     "bias_temperature_curve": (1e-6, -2e-6, 4e-6),
+    "scale_temperature_slope": (1e-4, -3e-4, 2e-4),
 }
 MATRIX = ((1.01, 0.02, -0.01), (0.0, 0.98, 0.03), (0.01, 0.0, 1.02))
 
 
 @pytest.mark.parametrize("device", [GYRO, ADIS])
 def test_compensation_takes_out_exactly_what_it_is_given(device: str) -> None:
-    # a matrix S = I + diag(scale) + cross, biases by temperature, g-sensitivity: M = S^-1, b, G
+    # a matrix S = I + diag(scale) + cross, biases and scale by temperature, g-sensitivity: M = S^-1, b, k, G
     scale_error = tuple(MATRIX[i][i] - 1.0 for i in range(3))
     cross = tuple(tuple(0.0 if i == j else MATRIX[i][j] for j in range(3)) for i in range(3))
     push = ((1e-3, 2e-3, -1e-3), (0.0, 3e-3, 1e-3), (-2e-3, 0.0, 1e-3))
