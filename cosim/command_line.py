@@ -262,6 +262,42 @@ def sensor_command(
         show_sensor(SensorRequest(device, out, quick, specimen, settings, dist))
 
 
+REPRODUCE_HELP = """Run the experiments of the two papers again, and lay what they print beside what comes out.
+
+PAPER is [bold]paper-a[/bold] (Jing & Gao 2021: three ADXRS450 and an ADXL355 on a turntable), [bold]paper-b[/bold] \
+(2010: an ADIS16354) or [bold]all[/bold]. Each experiment is the sensor on the turntable, run over many seeds: the \
+paper's own way, and ours. A printed number is inside when 5 to 95 % of the seeds enclose it.
+
+Written into the output folder: a picture for each experiment, paper-a.csv and paper-b.csv (the tables that are shown), \
+and trials (the figures of every run, from which an interrupted command goes on).
+
+[bold]Examples[/bold]
+
+  attitude-fmu reproduce
+
+  attitude-fmu reproduce paper-a --out papers
+"""
+
+Paper = Literal["paper-a", "paper-b", "all"]
+
+
+@application.command("reproduce", help=REPRODUCE_HELP, no_args_is_help=False)
+def reproduce_command(
+    paper: Annotated[Paper, typer.Argument(help="Whose experiments.", metavar="PAPER")] = "all",
+    out: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder for tables and pictures; made if missing.")
+    ] = Path("out"),
+    dist: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder of the FMUs, which are built where missing or stale.")
+    ] = Path("dist"),
+) -> None:
+    """Run the experiments of the two papers again."""
+    with _reported():
+        from .reproduce import reproduce
+
+        reproduce(paper, out, dist)
+
+
 def _show_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"attitude-fmu {version('attitude-fmu')}")

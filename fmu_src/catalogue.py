@@ -59,6 +59,14 @@ CATALOGUE = (
         icon="gimbal_controller.png",
         about="Give it the attitude sensor's signals; read the motor torques that hold the line of sight.",
     ),
+    Entry(
+        "Turntable",
+        "attitude_fmu.models.turntable",
+        60.0,
+        icon="turntable.png",
+        about="Give it a profile of moves, rests and turns; read the true attitude, rate and specific force of a "
+        "sensor on its plate, and when a rest is one to take results from.",
+    ),
 )
 
 

@@ -7,7 +7,7 @@ Arithmetic operators and comparisons need no help; a choice that depends on a si
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -42,6 +42,15 @@ def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
     if _is_symbol(condition):
         return _symbols().if_else(condition, a, b)
     return (a if condition else b) + 0.0
+
+
+def select(index: Scalar, items: Sequence[Scalar]) -> Scalar:
+    """``items[index]`` of a whole number, counted from 0; 0 outside."""
+    if isinstance(index, _NUMBER):
+        return items[int(index)] + 0.0 if 0 <= index < len(items) else 0.0
+    casadi = _symbols()
+    gated = [casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, index == i, item) for i, item in enumerate(items)]
+    return sum(gated, 0.0)
 
 
 def both(a: Scalar, b: Scalar) -> Scalar:

@@ -1,11 +1,11 @@
-"""The plant: a camera on a three-axis gimbal on a flexible tripod, in wind, with its shutter and knocks.
+"""The plant: a camera on a three-axis gimbal on a ball head on a flexible tripod, in wind, with its shutter and knocks.
 
-    M(q) u' + h(q, u) = tau,   u = (w_nt_t, yaw rate, pitch rate, roll rate)
+    M(q) u' + h(q, u) = tau,   u = (w_np_p, w_nt_t, yaw rate, pitch rate, roll rate)
 
-Six degrees of freedom: the tripod's head turns elastically about the apex P, the gimbal's three joints about the
-point O above it. Motor torques act between the bodies, so that their reactions and the imbalance reach the tripod.
-The mechanics are integrated by RK4; the friction's bristles, which are stiff at high rates, by their exact solution
-half a step before and half a step after (Strang splitting).
+Nine degrees of freedom: the tripod's apex turns elastically about P, the head about the ball's centre Q above it, the
+gimbal's three joints about the point O above that. Motor torques act between the bodies, so that their reactions and
+the imbalance reach the tripod. The mechanics are integrated by RK4; what is too fast for it, the friction's bristles
+and the motors' currents, by its exact solution half a step before and half a step after (Strang splitting).
 """
 
 from __future__ import annotations
@@ -27,35 +27,56 @@ from .attitude.rotations import (
     quaternion_product,
     turns_of,
 )
-from .plants.friction import Friction, LuGre, bristle_after, friction_torque, lugre
-from .plants.gimbal import (
-    NO_AXES,
-    Axes,
-    Body,
-    BodyAboutO,
-    HeadMotion,
-    JointMotion,
-    Wrench,
-    about_o,
-    camera_rates,
-    first_moment,
-    inverse_dynamics,
-    mass_matrix,
-    to_camera,
+from .plants.friction import Friction, LuGre, bristle_after, lugre
+from .plants.gimbal import NO_AXES, Axes, Body, JointMotion, Wrench, about_o, camera_rates, to_camera
+from .plants.joint import Cable, EndStop, JointParts
+from .plants.motor import DRIVE, Motor, MotorCommand, MotorConstants, current_after, current_at_rest, motor_constants
+from .plants.pulses import (
+    Knock,
+    Press,
+    Shutter,
+    knock_share,
+    press_share,
+    shutter_length,
+    shutter_shares,
 )
-from .plants.linear_equations import solve_symmetric
-from .plants.pulses import Knock, Shutter, knock_share, shutter_length, shutter_shares
-from .plants.tripod import Mount, Tripod, elastic_energy, mount, mount_motion
-from .plants.wind import Wind, WindCoefficients, WindState, wind_after, wind_coefficients, wind_now
+from .plants.rig import (
+    Loads,
+    Motion,
+    Parts,
+    Position,
+    Rates,
+    Rig,
+    equilibrium,
+    kinetic_energy,
+    motion_rate,
+    potential_energy,
+    rk4,
+)
+from .plants.rig_rules import MARGIN, body_rules, pulse_rule, start_rule
+from .plants.tripod import Head, Tripod, attitude, attitude_quaternion, carried_inertia, mount
+from .plants.wind import (
+    SPECTRUM,
+    Wind,
+    WindCoefficients,
+    WindState,
+    davenport_wind_after,
+    dryden_wind_after,
+    wind_coefficients,
+    wind_force,
+    wind_speed,
+)
 from .record import Integer, Matrix3, Quaternion, Real, Vector3
-from .scalar import PI, Scalar, floor, maximum, round_half_up, sqrt, where
+from .scalar import PI, Scalar, floor, maximum, round_half_up, sqrt
 from .system import Clock, Model, Rule, Task
-from .vectors import ZERO3, add, cross, matrix_product, multiply_transposed, scale, subtract
+from .vectors import ZERO3, add, cross, each_axis, matrix_product, multiply_transposed, scale, subtract
 
 # The bodies are sized after a mirrorless camera of 0.7 kg with a lens of 0.5 kg in a small gimbal: uniform boxes and
-# rings, with centres of gravity as far out as a careful user balances them (0.3 to 0.5 mm). All engineering judgement.
-_YAW_FRAME = Body(0.35, (0.0002, 0.0003, -0.06), (1.5e-3, 1.2e-3, 1.0e-3))
-_PITCH_FRAME = Body(0.25, (0.0002, -0.0002, 0.0002), (1.0e-3, 0.8e-3, 1.2e-3))
+# rings, with centres of gravity as far out as a careful user balances them (0.3 to 0.5 mm). The products of inertia are
+# those of arms on one side: the yaw frame's rises behind, the pitch frame's runs along the right. All engineering
+# judgement.
+_YAW_FRAME = Body(0.35, (0.0002, 0.0003, -0.06), (1.5e-3, 1.2e-3, 1.0e-3), (0.5e-4, 1.0e-4, 2.0e-4))
+_PITCH_FRAME = Body(0.25, (0.0002, -0.0002, 0.0002), (1.0e-3, 0.8e-3, 1.2e-3), (1.5e-4, 0.5e-4, 0.5e-4))
 _CAMERA = Body(1.2, (0.0003, 0.0005, -0.0005), (4.6e-3, 2.3e-3, 5.7e-3), (1.0e-4, 0.5e-4, 2.0e-4))
 
 
@@ -65,6 +86,34 @@ class JointFriction(NamedTuple):
     yaw: Friction = Friction()
     pitch: Friction = Friction()
     roll: Friction = Friction()
+
+
+class JointMotors(NamedTuple):
+    """Motor and driver of each joint."""
+
+    yaw: Motor = Motor()
+    pitch: Motor = Motor()
+    roll: Motor = Motor()
+
+
+class JointCables(NamedTuple):
+    """Cables through each joint."""
+
+    yaw: Cable = Cable()
+    pitch: Cable = Cable()
+    roll: Cable = Cable()
+
+
+def _within(degrees: float) -> EndStop:
+    return EndStop(-degrees / 180.0 * PI, degrees / 180.0 * PI)
+
+
+class JointStops(NamedTuple):
+    """End stops of each joint; travels are assumptions."""
+
+    yaw: EndStop = _within(170.0)
+    pitch: EndStop = _within(100.0)
+    roll: EndStop = _within(60.0)
 
 
 class Initial(NamedTuple):
@@ -82,9 +131,15 @@ class Parameters(NamedTuple):
     pitch_frame: Body = _PITCH_FRAME
     camera: Body = _CAMERA
     tripod: Tripod = Tripod()
+    head: Head = Head()
     friction: JointFriction = JointFriction()
+    cable: JointCables = JointCables()
+    stop: JointStops = JointStops()
+    drive: Annotated[int, DRIVE] = DRIVE.value("current")
+    motor: JointMotors = JointMotors()
     wind: Wind = Wind()
     shutter: Shutter = Shutter()
+    press: Press = Press()
     knock: Knock = Knock()
     initial: Initial = Initial()
     sensor_position: Annotated[Vector3, Real("m", "sensor from O, in camera axes", -1.0, 1.0, None, 0.01)] = (
@@ -103,32 +158,41 @@ class Coefficients(NamedTuple):
     """What the equations need, worked out once."""
 
     solver_period: Annotated[float, Real("s", "step of the integration")]
-    height: Annotated[float, Real("m", "O above P")]
-    bodies: tuple[BodyAboutO, BodyAboutO, BodyAboutO]
-    mount: Mount
+    rig: Rig
     friction: tuple[LuGre, LuGre, LuGre]
+    motor: tuple[MotorConstants, MotorConstants, MotorConstants]
     wind: WindCoefficients
 
 
 class Inputs(NamedTuple):
     """What the drives do."""
 
-    motor_torque: Annotated[Axes, Real("N.m", "on the joint; + turns its angle up", -100.0, 100.0, None, 0.1)] = NO_AXES
+    motor_torque: Annotated[
+        Axes, Real("N.m", "torque command of the joint; + turns its angle up", -100.0, 100.0, None, 0.1)
+    ] = NO_AXES
+    motor_voltage: Annotated[
+        Axes, Real("V", "of the joint's motor, where the drive is voltage; + turns its angle up", -1e3, 1e3)
+    ] = NO_AXES
 
 
 class State(NamedTuple):
     """All that evolves."""
 
     ticks: Annotated[float, Real("1", "solver steps so far")]
-    deflection: Annotated[Axes, Real("rad", "elastic angle of the tripod", display="deg")]
+    tripod: Annotated[Axes, Real("rad", "elastic angle of the tripod", display="deg")]
+    head: Annotated[Axes, Real("rad", "elastic angle of the ball head", display="deg")]
     joint: Annotated[Axes, Real("rad", "joint angle", display="deg")]
+    apex_rate: Annotated[Vector3, Real("rad/s", "w_np_p", display="deg/s")]
     head_rate: Annotated[Vector3, Real("rad/s", "w_nt_t", display="deg/s")]
     joint_rate: Annotated[Axes, Real("rad/s", "joint rate", display="deg/s")]
+    apex_acceleration: Annotated[Vector3, Real("rad/s2", "derivative of w_np_p")]
     head_acceleration: Annotated[Vector3, Real("rad/s2", "derivative of w_nt_t")]
     joint_acceleration: Annotated[Axes, Real("rad/s2", "joint acceleration")]
     bristle: Annotated[Axes, Real("rad", "deflection of the friction's bristles", display="deg")]
+    current: Annotated[Axes, Real("A", "of the joint's motor")]
     curtains: Annotated[float, Real("1", "momentum in the shutter's curtains, share of the impulse")]
     mirror: Annotated[float, Real("1", "momentum in the mirror, share of the impulse")]
+    presses: Annotated[float, Real("1", "presses taken, share of the impulse")]
     knocks: Annotated[float, Real("1", "blows taken")]
     wind: WindState
 
@@ -144,26 +208,14 @@ class Outputs(NamedTuple):
     temperature: Annotated[float, Real("K", "of the air", display="degC", nominal=300.0)]
     joint: Annotated[Axes, Real("rad", "joint angle", display="deg")]
     joint_rate: Annotated[Axes, Real("rad/s", "joint rate", display="deg/s")]
+    motor_current: Annotated[Axes, Real("A", "of the joint's motor")]
     tripod_deflection: Annotated[Axes, Real("rad", "elastic angle of the tripod", display="deg")]
+    head_deflection: Annotated[Axes, Real("rad", "elastic angle of the ball head", display="deg")]
     wind_speed: Annotated[float, Real("m/s", "at the camera")]
 
 
-Motion = tuple[Scalar, ...]
-"""Elastic angles (3), joint angles (3), w_nt_t (3), joint rates (3), in one tuple for the integrator."""
-
-
-class Drives(NamedTuple):
-    """Torques and forces held over a solver step."""
-
-    motor: Axes
-    bristle: Axes
-    on_head: Vector3
-    on_camera: Vector3
-    wind_force: Vector3
-
-
 def coefficients(p: Parameters) -> Coefficients:
-    """Bodies about O, the mount's damping, friction constants and the wind's discrete filters."""
+    """Bodies about O, the mounts' damping, friction and motor constants and the wind's discrete filters."""
     bodies = (about_o(p.yaw_frame), about_o(p.pitch_frame), about_o(p.camera))
     outer, middle, inner = bodies
     turned = (
@@ -171,60 +223,24 @@ def coefficients(p: Parameters) -> Coefficients:
         middle.inertia[0] + inner.inertia[0],
         inner.inertia[1],
     )
+    on_ball = carried_inertia(bodies, p.head.height)
+    on_apex = carried_inertia(bodies, p.head.height + p.tripod.height)
+    on_apex = Axes(*[load + own for load, own in zip(on_apex, p.head.inertia, strict=True)])
     every = maximum(round_half_up(p.wind.period / p.solver_period), 1.0)
+    half = 0.5 * p.solver_period
     return Coefficients(
         solver_period=p.solver_period,
-        height=p.tripod.height,
-        bodies=bodies,
-        mount=mount(p.tripod, bodies),
-        friction=(
-            lugre(p.friction.yaw, turned[0]),
-            lugre(p.friction.pitch, turned[1]),
-            lugre(p.friction.roll, turned[2]),
-        ),
+        rig=Rig(bodies, mount(p.tripod, on_apex), mount(p.head, on_ball)),
+        friction=each_axis(lambda i: lugre(p.friction[i], turned[i])),
+        motor=each_axis(lambda i: motor_constants(p.motor[i], half)),
         wind=wind_coefficients(p.wind, p.solver_period, every),
     )
 
 
-def _motion_rate(motion: Motion, drives: Drives, c: Coefficients, gravity: Scalar, center: Vector3) -> Motion:
-    """Derivative of the motion: elastic rates, joint rates, and u' of M(q) u' = tau - h(q, u)."""
-    yaw, pitch, roll, joint_yaw, joint_pitch, joint_roll, wx, wy, wz, *rest = motion
-    w, rates = (wx, wy, wz), Axes(*rest)
-    bodies, height, (ix, iy, iz) = c.bodies, c.height, c.mount.inertia
-    turns = turns_of(Axes(joint_yaw, joint_pitch, joint_roll))
-    elastic_rates, elastic, up = mount_motion(c.mount, Axes(yaw, pitch, roll), w)
-    spin = -height * (wx * wx + wy * wy)
-    felt = (wx * wz * height + gravity * up[0], wy * wz * height + gravity * up[1], spin + gravity * up[2])
-    wind = to_camera(turns, drives.wind_force)
-    outside = Wrench(wind, add(cross(center, wind), drives.on_camera))
-    wanted, (force, moment) = inverse_dynamics(
-        bodies, turns, HeadMotion(w, ZERO3, felt), JointMotion(rates, NO_AXES), outside
-    )
-    motor, bristle, friction, on_head = drives.motor, drives.bristle, c.friction, drives.on_head
-    torques = (
-        elastic[0] + on_head[0] - moment[0] + height * force[1] - (iz - iy) * wy * wz,
-        elastic[1] + on_head[1] - moment[1] - height * force[0] - (ix - iz) * wz * wx,
-        elastic[2] + on_head[2] - moment[2] - (iy - ix) * wx * wy,
-        motor[0] - friction_torque(friction[0], bristle[0], rates[0]) - wanted[0],
-        motor[1] - friction_torque(friction[1], bristle[1], rates[1]) - wanted[1],
-        motor[2] - friction_torque(friction[2], bristle[2], rates[2]) - wanted[2],
-    )
-    return (*elastic_rates, *rates, *solve_symmetric(mass_matrix(bodies, turns, height, c.mount.inertia), torques))
-
-
-def _moved(motion: Motion, step: Scalar, rate: Motion) -> Motion:
-    return tuple([x + step * r for x, r in zip(motion, rate, strict=True)])
-
-
-def _rk4(motion: Motion, drives: Drives, c: Coefficients, gravity: Scalar, center: Vector3) -> Motion:
-    h = c.solver_period
-    half, sixth = 0.5 * h, h / 6.0
-    k1 = _motion_rate(motion, drives, c, gravity, center)
-    k2 = _motion_rate(_moved(motion, half, k1), drives, c, gravity, center)
-    k3 = _motion_rate(_moved(motion, half, k2), drives, c, gravity, center)
-    k4 = _motion_rate(_moved(motion, h, k3), drives, c, gravity, center)
-    return tuple(
-        [x + sixth * (r1 + 2.0 * (r2 + r3) + r4) for x, r1, r2, r3, r4 in zip(motion, k1, k2, k3, k4, strict=True)]
+def joint_parts(p: Parameters, c: Coefficients) -> Parts:
+    """What acts on the joints by itself."""
+    return each_axis(
+        lambda i: JointParts(c.friction[i], p.cable[i], p.stop[i], c.motor[i].cogging, p.motor[i].cogging_positions)
     )
 
 
@@ -233,29 +249,35 @@ def _about(axes: Axes) -> Vector3:
     return axes[1], axes[2], -axes[0]
 
 
-def _bristles(c: Coefficients, bristle: Axes, rates: Motion) -> Axes:
-    half, friction = 0.5 * c.solver_period, c.friction
+def _bristles(c: Coefficients, bristle: Axes, rates: Axes) -> Axes:
+    half = 0.5 * c.solver_period
+    return Axes(*each_axis(lambda i: bristle_after(c.friction[i], bristle[i], rates[i], half)))
+
+
+def _command(inputs: Inputs, p: Parameters, axis: int) -> MotorCommand:
+    return MotorCommand(p.drive, inputs.motor_torque[axis], inputs.motor_voltage[axis])
+
+
+def _currents(inputs: Inputs, p: Parameters, c: Coefficients, current: Axes, rates: Axes) -> Axes:
     return Axes(
-        bristle_after(friction[0], bristle[0], rates[0], half),
-        bristle_after(friction[1], bristle[1], rates[1], half),
-        bristle_after(friction[2], bristle[2], rates[2], half),
+        *each_axis(
+            lambda i: current_after(p.motor[i], c.motor[i], _command(inputs, p, i), current[i], rates[i]),
+        )
     )
 
 
-def _wind_force(state_wind: WindState, deflection: Axes, p: Parameters, c: Coefficients, share: Scalar) -> Vector3:
-    """Wind force on the camera in t."""
-    force_n, _ = wind_now(p.wind, c.wind, state_wind, share)
-    return multiply_transposed(_head_attitude(deflection, p), force_n)
+def _torques(current: Axes, p: Parameters) -> Axes:
+    return Axes(*each_axis(lambda i: p.motor[i].torque_constant * current[i]))
 
 
-def _head_euler(deflection: Axes, p: Parameters) -> Euler:
-    """The head's yaw, pitch and roll against n."""
-    return Euler(p.initial.heading + deflection[0], deflection[1], deflection[2])
+def _apex_attitude(tripod: Axes, p: Parameters) -> Matrix3:
+    """C_np."""
+    return matrix_product(matrix_from_euler(Euler(p.initial.heading, 0.0, 0.0)), attitude(tripod))
 
 
-def _head_attitude(deflection: Axes, p: Parameters) -> Matrix3:
+def _head_attitude(tripod: Axes, head: Axes, p: Parameters) -> Matrix3:
     """C_nt."""
-    return matrix_from_euler(_head_euler(deflection, p))
+    return matrix_product(_apex_attitude(tripod, p), attitude(head))
 
 
 def _wind_share(state: State, c: Coefficients, steps: Scalar) -> Scalar:
@@ -264,151 +286,212 @@ def _wind_share(state: State, c: Coefficients, steps: Scalar) -> Scalar:
     return (ticks - every * floor(ticks / every) + steps) / every
 
 
-def integrate(state: State, inputs: Inputs, p: Parameters, c: Coefficients, _normals: tuple[Scalar, ...]) -> State:
-    """One solver step: half a step of the bristles, RK4 of the mechanics, half a step of the bristles.
+class _Pulses(NamedTuple):
+    """Momenta handed over so far, as shares of the impulses."""
 
-    Torques of motors, pulses and wind are held over the step; those of pulses and wind are its means.
-    """
-    h = c.solver_period
-    ticks = state.ticks + 1.0
-    time = ticks * h
-    curtains, mirror = shutter_shares(p.shutter, time)
-    knocks = knock_share(p.knock, time)
+    curtains: Scalar
+    mirror: Scalar
+    presses: Scalar
+    knocks: Scalar
+
+
+def _pulses_at(p: Parameters, time: Scalar) -> _Pulses:
+    return _Pulses(*shutter_shares(p.shutter, time), press_share(p.press, time), knock_share(p.knock, time))
+
+
+def _on_camera(p: Parameters, gained: _Pulses, h: Scalar) -> Wrench:
+    """Mean force at O and torque about it (in b) of shutter, mirror and finger over a step of h (s)."""
     pulse = [
-        (a * (curtains - state.curtains) + b * (mirror - state.mirror)) / h
+        (a * gained.curtains + b * gained.mirror) / h
         for a, b in zip(p.shutter.impulse, p.shutter.mirror_impulse, strict=True)
     ]
-    blow = scale((knocks - state.knocks) / h, _about(p.knock.impulse))
-    before = _bristles(c, state.bristle, state.joint_rate)
-    drives = Drives(
-        motor=inputs.motor_torque,
-        bristle=before,
-        on_head=blow,
-        on_camera=_about(Axes(*pulse)),
-        wind_force=_wind_force(state.wind, state.deflection, p, c, _wind_share(state, c, 0.5)),
+    pressed = (0.0, 0.0, -0.5 * p.press.force * p.press.duration * gained.presses / h)
+    return Wrench(pressed, add(_about(Axes(*pulse)), cross(p.press.position, pressed)))
+
+
+def integrate(state: State, inputs: Inputs, p: Parameters, c: Coefficients, _normals: tuple[Scalar, ...]) -> State:
+    """One solver step: RK4 of the mechanics, between two half steps of bristles and currents.
+
+    Commands, pulses and wind are held over the step; those of pulses and wind are its means.
+    """
+    h, parts = c.solver_period, joint_parts(p, c)
+    ticks = state.ticks + 1.0
+    pulses = _pulses_at(p, ticks * h)
+    gained = _Pulses(
+        pulses.curtains - state.curtains,
+        pulses.mirror - state.mirror,
+        pulses.presses - state.presses,
+        pulses.knocks - state.knocks,
     )
-    start = (*state.deflection, *state.joint, *state.head_rate, *state.joint_rate)
-    end = _rk4(start, drives, c, p.gravity, p.wind.center_of_pressure)
-    after = _bristles(c, before, end[9:12])
-    rate = _motion_rate(end, drives._replace(bristle=after), c, p.gravity, p.wind.center_of_pressure)
+    bristle = _bristles(c, state.bristle, state.joint_rate)
+    current = _currents(inputs, p, c, state.current, state.joint_rate)
+    force_n = wind_force(p.wind, c.wind, state.wind, _wind_share(state, c, 0.5))
+    loads = Loads(
+        motor=_torques(current, p),
+        bristle=bristle,
+        on_apex=scale(gained.knocks / h, _about(p.knock.impulse)),
+        on_camera=_on_camera(p, gained, h),
+        wind=multiply_transposed(_head_attitude(state.tripod, state.head, p), force_n),
+        center_of_pressure=p.wind.center_of_pressure,
+    )
+    end = rk4(_motion_of(state), loads, c.rig, parts, p.gravity, h)
+    position, rates = end
+    bristle = _bristles(c, bristle, rates.joint)
+    current = _currents(inputs, p, c, current, rates.joint)
+    after = loads._replace(motor=_torques(current, p), bristle=bristle)
+    acceleration = motion_rate(end, after, c.rig, parts, p.gravity).rates
     return State(
         ticks=ticks,
-        deflection=Axes(*end[0:3]),
-        joint=Axes(*end[3:6]),
-        head_rate=end[6:9],
-        joint_rate=Axes(*end[9:12]),
-        head_acceleration=rate[6:9],
-        joint_acceleration=Axes(*rate[9:12]),
-        bristle=after,
-        curtains=curtains,
-        mirror=mirror,
-        knocks=knocks,
+        tripod=position.tripod,
+        head=position.head,
+        joint=position.joint,
+        apex_rate=rates.apex,
+        head_rate=rates.head,
+        joint_rate=rates.joint,
+        apex_acceleration=acceleration.apex,
+        head_acceleration=acceleration.head,
+        joint_acceleration=acceleration.joint,
+        bristle=bristle,
+        current=current,
+        curtains=pulses.curtains,
+        mirror=pulses.mirror,
+        presses=pulses.presses,
+        knocks=pulses.knocks,
         wind=state.wind,
     )
 
 
-def blow_on(state: State, _inputs: Inputs, _p: Parameters, c: Coefficients, normals: tuple[Scalar, ...]) -> State:
-    """The next gusts and vortices."""
-    return state._replace(wind=wind_after(state.wind, c.wind, normals))
+def _motion_of(state: State) -> Motion:
+    return Motion(
+        Position(state.tripod, state.head, state.joint),
+        Rates(state.apex_rate, state.head_rate, state.joint_rate),
+    )
 
 
-def _equilibrium(drives: Drives, p: Parameters, c: Coefficients) -> Axes:
-    """Elastic angles at rest with locked joints: e <- e + (k e - wanted torque) / k, four times.
+def blow_dryden(state: State, _inputs: Inputs, _p: Parameters, c: Coefficients, normals: tuple[Scalar, ...]) -> State:
+    """The next Dryden gusts and vortices."""
+    return state._replace(wind=dryden_wind_after(state.wind, c.wind, normals))
 
-    Each turn gains a factor of stiffness over gravity's tilting moment, a thousand for a usable tripod.
-    """
-    k = c.mount.stiffness
-    turns = turns_of(p.initial.joint)
-    force_b = to_camera(turns, drives.wind_force)
-    outside = Wrench(force_b, cross(p.wind.center_of_pressure, force_b))
-    still = JointMotion(NO_AXES, NO_AXES)
-    e = NO_AXES
-    for _ in range(4):
-        _, elastic, up = mount_motion(c.mount, e, ZERO3)
-        head = HeadMotion(ZERO3, ZERO3, scale(p.gravity, up))
-        _, (force, moment) = inverse_dynamics(c.bodies, turns, head, still, outside)
-        about_p = add(moment, (-c.height * force[1], c.height * force[0], 0.0))
-        left = subtract(elastic, about_p)
-        e = Axes(e.yaw - left[2] / k.yaw, e.pitch + left[0] / k.pitch, e.roll + left[1] / k.roll)
-    return e
+
+def blow_davenport(state: State, _i: Inputs, _p: Parameters, c: Coefficients, normals: tuple[Scalar, ...]) -> State:
+    """The next Davenport gusts and vortices."""
+    return state._replace(wind=davenport_wind_after(state.wind, c.wind, normals))
 
 
 def initial_state(p: Parameters, c: Coefficients, inputs: Inputs) -> State:
-    """The tripod at rest under gravity and mean wind, the joints where the parameters put them."""
+    """Tripod and head at rest under gravity and mean wind, the joints where the parameters put them."""
     wind = WindState()
-    drives = Drives(inputs.motor_torque, NO_AXES, ZERO3, ZERO3, _wind_force(wind, NO_AXES, p, c, 0.0))
-    deflection = _equilibrium(drives, p, c)
-    start = (*deflection, *p.initial.joint, *ZERO3, *p.initial.joint_rate)
-    rate = _motion_rate(start, drives, c, p.gravity, p.wind.center_of_pressure)
+    force_n = wind_force(p.wind, c.wind, wind, 0.0)
+    current = Axes(*each_axis(lambda i: current_at_rest(p.motor[i], _command(inputs, p, i))))
+    loads = Loads(
+        motor=_torques(current, p),
+        bristle=NO_AXES,
+        on_apex=ZERO3,
+        on_camera=Wrench(ZERO3, ZERO3),
+        wind=multiply_transposed(_head_attitude(NO_AXES, NO_AXES, p), force_n),
+        center_of_pressure=p.wind.center_of_pressure,
+    )
+    position = equilibrium(p.initial.joint, loads, c.rig, p.gravity)
+    start = Motion(position, Rates(ZERO3, ZERO3, p.initial.joint_rate))
+    rate = motion_rate(start, loads, c.rig, joint_parts(p, c), p.gravity).rates
     return State(
         ticks=0.0,
-        deflection=deflection,
+        tripod=position.tripod,
+        head=position.head,
         joint=p.initial.joint,
+        apex_rate=ZERO3,
         head_rate=ZERO3,
         joint_rate=p.initial.joint_rate,
-        head_acceleration=rate[6:9],
-        joint_acceleration=Axes(*rate[9:12]),
+        apex_acceleration=rate.apex,
+        head_acceleration=rate.head,
+        joint_acceleration=rate.joint,
         bristle=NO_AXES,
+        current=current,
         curtains=0.0,
         mirror=0.0,
+        presses=0.0,
         knocks=0.0,
         wind=wind,
     )
 
 
+def _turning(w: Vector3, alpha: Vector3, r: Vector3) -> Vector3:
+    """w' x r + w x (w x r)."""
+    return add(cross(alpha, r), cross(w, cross(w, r)))
+
+
 def outputs(state: State, p: Parameters, c: Coefficients) -> Outputs:
     """f_b = C_tb' (a_O + g up) + w' x r + w x (w x r);  w_ib_b = w_nb_b + C_nb' w_ie_n."""
     turns = turns_of(state.joint)
-    c_nt = _head_attitude(state.deflection, p)
-    c_nb = matrix_product(c_nt, matrix_from_turns(turns))
+    c_np, c_pt = _apex_attitude(state.tripod, p), attitude(state.head)
+    c_nb = matrix_product(matrix_product(c_np, c_pt), matrix_from_turns(turns))
     joints = JointMotion(state.joint_rate, state.joint_acceleration)
     w, alpha = camera_rates(turns, state.head_rate, state.head_acceleration, joints)
     earth = multiply_transposed(c_nb, earth_rate_n(p.latitude))
-    o = (0.0, 0.0, c.height)
-    at_o = add(
-        cross(state.head_acceleration, o),
-        add(cross(state.head_rate, cross(state.head_rate, o)), scale(p.gravity, c_nt[2])),
-    )
-    r = p.sensor_position
-    felt = add(to_camera(turns, at_o), add(cross(alpha, r), cross(w, cross(w, r))))
-    _, speed = wind_now(p.wind, c.wind, state.wind, _wind_share(state, c, 0.0))
-    head = quaternion_from_euler(_head_euler(state.deflection, p))
-    joint = quaternion_from_euler(Euler(*state.joint))
+    q, o = (0.0, 0.0, c.rig.tripod.height), (0.0, 0.0, c.rig.head.height)
+    at_q = add(scale(p.gravity, c_np[2]), _turning(state.apex_rate, state.apex_acceleration, q))
+    at_o = add(multiply_transposed(c_pt, at_q), _turning(state.head_rate, state.head_acceleration, o))
+    heading = quaternion_from_euler(Euler(p.initial.heading, 0.0, 0.0))
+    mounts = quaternion_product(attitude_quaternion(state.tripod), attitude_quaternion(state.head))
+    head = quaternion_product(heading, mounts)
     return Outputs(
         euler=euler_from_matrix(c_nb),
-        quaternion=normalised(quaternion_product(head, joint)),
+        quaternion=normalised(quaternion_product(head, quaternion_from_euler(Euler(*state.joint)))),
         rate=add(w, earth),
         angular_acceleration=subtract(alpha, cross(w, earth)),
-        specific_force=felt,
+        specific_force=add(to_camera(turns, at_o), _turning(w, alpha, p.sensor_position)),
         temperature=p.ambient_temperature,
         joint=state.joint,
         joint_rate=state.joint_rate,
-        tripod_deflection=state.deflection,
-        wind_speed=speed,
+        motor_current=state.current,
+        tripod_deflection=state.tripod,
+        head_deflection=state.head,
+        wind_speed=wind_speed(p.wind, state.wind, _wind_share(state, c, 0.0)),
     )
 
 
 def energy(state: State, p: Parameters, c: Coefficients) -> Scalar:
-    """T + V of the mechanics, J: u'Mu/2, the mount's springs, and gravity from the apex up."""
-    turns = turns_of(state.joint)
-    m = mass_matrix(c.bodies, turns, c.height, c.mount.inertia)
-    u = (*state.head_rate, *state.joint_rate)
-    kinetic, k = 0.0, 0
-    for i in range(6):
-        for j in range(i + 1):
-            kinetic = kinetic + (0.5 if i == j else 1.0) * m[k] * u[i] * u[j]
-            k += 1
-    x, y, z = first_moment(c.bodies, turns)
-    up = _head_attitude(state.deflection, p)[2]
-    mass = c.bodies[0].mass + c.bodies[1].mass + c.bodies[2].mass
-    lifted = up[0] * x + up[1] * y + up[2] * (z + mass * c.height)
-    return kinetic + elastic_energy(c.mount, state.deflection) + p.gravity * lifted
+    """T + V of the mechanics, J: u'Mu/2, all springs, and gravity from the apex up."""
+    motion = _motion_of(state)
+    return kinetic_energy(motion, c.rig) + potential_energy(motion.position, c.rig, joint_parts(p, c), p.gravity)
 
 
 # --- values that must go together ------------------------------------------------------------------------------------
 
-_MARGIN = 1e-9
-"""Relative width of a limit: what is computed from decimal numbers may miss it by roundings."""
+_LEAST_MASS = 1e-9
+"""kg; keeps a weightless gimbal's centre of gravity defined."""
+
+_HARDEST_IMPACT = 10.0
+"""rad/s, on an end stop; its damping grows with the rate."""
+
+
+def _mounts_fastest(p: Parameters, c: Coefficients, axis: int) -> Scalar:
+    """Bound of the modes of tripod and head about an axis, the gimbal a mass on top: traces of M^-1 K and M^-1 C."""
+    bodies, (low, high) = (p.yaw_frame, p.pitch_frame, p.camera), (c.rig.tripod, c.rig.head)
+    mass: Scalar = sum([body.mass for body in bodies])
+    moment: Scalar = sum([body.mass * (high.height + body.center_of_gravity[2]) for body in bodies])
+    tilting = 0.0 if axis == 0 else 1.0
+    arm = tilting * moment / maximum(mass, _LEAST_MASS)
+    below = p.tripod.inertia[axis] + tilting * mass * low.height * low.height
+    above = p.head.inertia[axis] + mass * arm * arm
+    beside = mass * arm * low.height
+    determinant = below * above - beside * beside
+
+    def trace(of_tripod: Scalar, of_head: Scalar) -> Scalar:
+        return (of_tripod * above + of_head * (above + 2.0 * beside + below)) / determinant
+
+    return sqrt(trace(low.stiffness[axis], high.stiffness[axis])) + trace(low.damping[axis], high.damping[axis])
+
+
+def _joints_fastest(p: Parameters, c: Coefficients, axis: int) -> Scalar:
+    """Bound of bristle, cable, cogging, back-EMF and of the end stop, on the camera alone."""
+    inertia = (p.camera.inertia[2], p.camera.inertia[0], p.camera.inertia[1])[axis]
+    friction, motor, stop, cable = c.friction[axis], p.motor[axis], p.stop[axis], p.cable[axis]
+    springs = friction.stiffness + cable.stiffness + c.motor[axis].cogging * motor.cogging_positions
+    braking = motor.torque_constant * motor.torque_constant / motor.resistance
+    damping = friction.damping + friction.viscous + cable.damping + braking
+    bumper = sqrt(stop.stiffness / inertia)
+    return maximum(sqrt(springs / inertia) + damping / inertia, bumper * (1.0 + stop.loss * _HARDEST_IMPACT))
 
 
 def _fastest(p: Parameters) -> Scalar:
@@ -417,96 +500,61 @@ def _fastest(p: Parameters) -> Scalar:
     J is the inertia that each is sure to move.
     """
     c = coefficients(p)
-    x, y, z = p.camera.inertia
     fastest: Scalar = 0.0
-    for k, damping, inertia in zip(c.mount.stiffness, c.mount.damping, p.tripod.inertia, strict=True):
-        fastest = maximum(fastest, sqrt(k / inertia) + damping / inertia)
-    for friction, inertia in zip(c.friction, (z, x, y), strict=True):
-        damping = friction.damping + friction.viscous
-        fastest = maximum(fastest, sqrt(friction.stiffness / inertia) + damping / inertia)
+    for axis in range(3):
+        fastest = maximum(fastest, maximum(_mounts_fastest(p, c, axis), _joints_fastest(p, c, axis)))
     return fastest
 
 
-def _tipping(p: Parameters) -> Scalar:
-    """Stiffness below which gravity tips the head over, N.m/rad: g sum(m (h + z))."""
-    c = coefficients(p)
-    outer, middle, inner = (body.mass * c.height + body.moment[2] for body in c.bodies)
+def _tipping(p: Parameters, height: Scalar) -> Scalar:
+    """Stiffness below which gravity tips what is elastic `height` (m) under O over, N.m/rad: g sum(m (height + z))."""
+    outer, middle, inner = (
+        body.mass * (height + body.center_of_gravity[2]) for body in (p.yaw_frame, p.pitch_frame, p.camera)
+    )
     return p.gravity * (outer + middle + inner)
 
 
-def _moment_rule(name: str, axis: int) -> Rule:
-    def limits(p: Parameters) -> tuple[Scalar, Scalar]:
-        inertia = getattr(p, name).inertia
-        return 0.0, (inertia[axis - 1] + inertia[axis - 2]) * (1.0 + _MARGIN)
-
-    return Rule(f"{name}.inertia[{axis + 1}]", "larger than the other two together, as in no rigid body", limits)
-
-
-def _product_rules(name: str) -> tuple[Rule, ...]:
-    """The inertia tensor is positive definite: what its minors leave for xy, xz and then yz."""
-
-    def around(centre: Scalar, square: Scalar) -> tuple[Scalar, Scalar]:
-        half = (1.0 - _MARGIN) * sqrt(maximum(square, 0.0))
-        return centre - half, centre + half
-
-    def xy_limits(p: Parameters) -> tuple[Scalar, Scalar]:
-        x, y, _ = getattr(p, name).inertia
-        return around(0.0, x * y)
-
-    def xz_limits(p: Parameters) -> tuple[Scalar, Scalar]:
-        x, _, z = getattr(p, name).inertia
-        return around(0.0, x * z)
-
-    def yz_limits(p: Parameters) -> tuple[Scalar, Scalar]:
-        (x, y, z), (xy, xz, _) = getattr(p, name).inertia, getattr(p, name).products
-        return around(xy * xz / x, (x * y - xy * xy) * (x * z - xz * xz) / (x * x))
-
-    why = "too large for the moments, as in no rigid body"
-    return tuple(
-        Rule(f"{name}.products[{i}]", why, limits) for i, limits in enumerate((xy_limits, xz_limits, yz_limits), 1)
-    )
-
-
-def _body_rules(name: str) -> tuple[Rule, ...]:
-    return (*[_moment_rule(name, axis) for axis in range(3)], *_product_rules(name))
-
-
-def _pulse_rule(name: str, length: Callable[[Parameters], Scalar], why: str) -> Rule:
-    def limits(p: Parameters) -> tuple[Scalar, Scalar]:
-        return where(getattr(p, name).period > 0.0, length(p), 0.0), inf
-
-    return Rule(f"{name}.period", why, limits)
-
-
 def _rules() -> tuple[Rule, ...]:
-    """Bodies must be rigid, pulses must end before they start again, the tripod must stand, the step must be stable.
+    """Bodies must be rigid, pulses must end before they start again, tripod and head must stand, joints must start
+    between their stops, the step must be stable.
 
     A step times the fastest rate of 1 is half of what RK4 and the splitting bear.
     """
-    standing = [
-        Rule(
-            f"tripod.stiffness.{axis}",
-            "the camera's weight tips the tripod over",
-            lambda p: (_tipping(p) * (1.0 + _MARGIN), inf),
-        )
-        for axis in ("pitch", "roll")
-    ]
+
+    def standing(name: str, height: Callable[[Parameters], Scalar]) -> list[Rule]:
+        why = f"the camera's weight tips the {name} over"
+        return [
+            Rule(f"{name}.stiffness.{axis}", why, lambda p: (_tipping(p, height(p)) * (1.0 + MARGIN), inf))
+            for axis in ("pitch", "roll")
+        ]
+
     return (
-        *[rule for name in ("yaw_frame", "pitch_frame", "camera") for rule in _body_rules(name)],
-        _pulse_rule("shutter", lambda p: shutter_length(p.shutter), "0 switches it off; the exposure is not over"),
-        _pulse_rule("knock", lambda p: p.knock.width, "0 switches it off; the blow is not over"),
-        *standing,
+        *[rule for name in ("yaw_frame", "pitch_frame", "camera") for rule in body_rules(name)],
+        pulse_rule("shutter", lambda p: shutter_length(p.shutter), "0 switches it off; the exposure is not over"),
+        pulse_rule("press", lambda p: p.press.duration, "0 switches it off; the press is not over"),
+        pulse_rule("knock", lambda p: p.knock.width, "0 switches it off; the blow is not over"),
+        *standing("tripod", lambda p: p.head.height + p.tripod.height),
+        *standing("head", lambda p: p.head.height),
+        *[start_rule(axis) for axis in range(3)],
         Rule(
             "solver_period",
-            "too long for the stiffness and damping of tripod and friction",
+            "too long for the stiffness and damping of tripod, head, friction and stops",
             lambda p: (0.0, 1.0 / _fastest(p)),
         ),
     )
 
 
+def _spectrum(p: Parameters) -> int:
+    return p.wind.spectrum
+
+
+def _wind_period(c: Coefficients) -> Scalar:
+    return c.wind.every
+
+
 MODEL = Model(
     name="TripodGimbal",
-    description="Camera on a three-axis gimbal on a flexible tripod, in wind",
+    description="Camera on a three-axis gimbal on a ball head on a flexible tripod, in wind",
     Parameters=Parameters,
     Coefficients=Coefficients,
     Inputs=Inputs,
@@ -518,7 +566,8 @@ MODEL = Model(
     clocks=(Clock("solver", lambda c: c.solver_period),),
     tasks=(
         Task("integrate", "solver", integrate),
-        Task("wind", "solver", blow_on, every=lambda c: c.wind.every, normals=5),
+        Task("wind", "solver", {SPECTRUM.value("dryden"): blow_dryden}, _spectrum, _wind_period, normals=5),
+        Task("davenport", "solver", {SPECTRUM.value("davenport"): blow_davenport}, _spectrum, _wind_period, normals=10),
     ),
     seed=lambda p: p.seed,
     rules=_rules(),

@@ -20,9 +20,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
-from ..record import Matrix3, Quaternion, Real, Vector3
+from ..record import Matrix3, Quaternion, Real, Vector3, choose
 from ..scalar import Scalar, both, exp, minimum, where
-from ..vectors import add, dot, multiply, multiply_transposed, scale, subtract
+from ..vectors import ZERO3, add, dot, multiply, multiply_transposed, scale, subtract
 from .integration import turned
 from .rotations import earth_rate_n, matrix_from_quaternion, normalised, quaternion_product
 
@@ -55,6 +55,24 @@ class FusionParameters(NamedTuple):
     initial_tilt: Annotated[
         float, Real("rad", "standard deviation of the tilt at the start", min=1e-9, display="deg")
     ] = 0.005
+    specific_force_noise: Annotated[
+        float,
+        Real(
+            "m/s^1.5",
+            "white noise of the specific force beyond bounded velocity: a bench that shakes",
+            0.0,
+            tunable=True,
+        ),
+    ] = 0.0
+    push_noise: Annotated[
+        float,
+        Real(
+            "s^0.5",
+            "further noise by m/s2 away from the mean specific force, unless at rest: knocks",
+            0.0,
+            tunable=True,
+        ),
+    ] = 0.0
     velocity_bound: Annotated[
         float, Real("m/s^0.5", "noise of the statement that velocity is zero", min=1e-6, tunable=True)
     ] = 1.05
@@ -85,6 +103,15 @@ class FusionParameters(NamedTuple):
     ] = 0.5
     rest_time: Annotated[float, Real("s", "time of quiet after which it is rest", min=0.0, tunable=True)] = 1.5
     rest_memory: Annotated[float, Real("s", "time constant of those means", min=1e-3, tunable=True)] = 0.5
+    rest_tilt_noise: Annotated[
+        float,
+        Real(
+            "rad/s^0.5",
+            "random walk of the attitude at rest, which is held then; 0: gyros are integrated at rest too",
+            min=0.0,
+            tunable=True,
+        ),
+    ] = 0.0
 
 
 class RestState(NamedTuple):
@@ -150,22 +177,25 @@ def _row(p: Triangle, index: int) -> list[Scalar]:
     return [p[n] for n in _ROW[index]]
 
 
-def _predicted(p: Triangle, c_nb: Matrix3, f_up: Scalar, h: Scalar) -> list[Scalar]:
-    """Upper triangle of F P F' with F = I + h A: first the changed rows of G = F P, then G F'."""
+def _predicted(p: Triangle, c_nb: Matrix3, f_up: Scalar, h: Scalar, free: Scalar) -> list[Scalar]:
+    """Upper triangle of F P F' with F = I + h A: first the changed rows of G = F P, then G F'.
+
+    Of the h seconds the gyros, and with them their bias, turn the attitude for `free`.
+    """
     phi_x, phi_y, v_x, v_y, b_x, b_y, b_z = [_row(p, index) for index in range(STATES)]
     (xx, xy, xz), (yx, yy, yz), _ = c_nb
     push = h * f_up
-    g0 = [a - h * (xx * u + xy * v + xz * w) for a, u, v, w in zip(phi_x, b_x, b_y, b_z, strict=True)]
-    g1 = [a - h * (yx * u + yy * v + yz * w) for a, u, v, w in zip(phi_y, b_x, b_y, b_z, strict=True)]
+    g0 = [a - free * (xx * u + xy * v + xz * w) for a, u, v, w in zip(phi_x, b_x, b_y, b_z, strict=True)]
+    g1 = [a - free * (yx * u + yy * v + yz * w) for a, u, v, w in zip(phi_y, b_x, b_y, b_z, strict=True)]
     g2 = [a + push * b for a, b in zip(v_x, phi_y, strict=True)]
     g3 = [a - push * b for a, b in zip(v_y, phi_x, strict=True)]
     return [
-        g0[0] - h * (xx * g0[4] + xy * g0[5] + xz * g0[6]),
-        g0[1] - h * (yx * g0[4] + yy * g0[5] + yz * g0[6]),
+        g0[0] - free * (xx * g0[4] + xy * g0[5] + xz * g0[6]),
+        g0[1] - free * (yx * g0[4] + yy * g0[5] + yz * g0[6]),
         g0[2] + push * g0[1],
         g0[3] - push * g0[0],
         *g0[4:],
-        g1[1] - h * (yx * g1[4] + yy * g1[5] + yz * g1[6]),
+        g1[1] - free * (yx * g1[4] + yy * g1[5] + yz * g1[6]),
         g1[2] + push * g1[1],
         g1[3] - push * g1[0],
         *g1[4:],
@@ -199,7 +229,10 @@ def fused_step(fused: Fused, rate: Vector3, force: Vector3, a: FusionParameters,
     q, bias, fusion = fused
     earth = multiply_transposed(matrix_from_quaternion(q), earth_rate_n(latitude))
     known = add(bias, earth)
-    turn = subtract(rate, known)
+    rest = _rest_after(fusion, rate, force, add(fusion.anchor, earth), a, h)
+    resting = rest.quiet > a.rest_time
+    held = both(resting, a.rest_tilt_noise > 0.0)
+    turn = choose(held, ZERO3, subtract(rate, known))
     q = turned(q, scale(h, turn))
     c_nb = matrix_from_quaternion(q)
     f_n = multiply(c_nb, force)
@@ -207,15 +240,16 @@ def fused_step(fused: Fused, rate: Vector3, force: Vector3, a: FusionParameters,
     vx, vy = v[0] + h * f_n[0], v[1] + h * f_n[1]
     memory = 1.0 - exp(-h / VELOCITY_MEMORY)
     lately = fusion.mean_square_velocity + memory * (vx * vx + vy * vy - fusion.mean_square_velocity)
-    rest = _rest_after(fusion, rate, force, add(fusion.anchor, earth), a, h)
-    resting = rest.quiet > a.rest_time
 
-    p = _predicted(fusion.covariance, c_nb, f_n[2], h)
-    tilt_noise = h * (a.gyro_noise * a.gyro_noise + a.rate_noise * a.rate_noise * dot(turn, turn))
+    p = _predicted(fusion.covariance, c_nb, f_n[2], h, where(held, 0.0, h))
+    white = where(held, a.rest_tilt_noise, a.gyro_noise)
+    tilt_noise = h * (white * white + a.rate_noise * a.rate_noise * dot(turn, turn))
+    pushed = subtract(force, rest.specific_force)
+    push = where(resting, 0.0, a.push_noise * a.push_noise * dot(pushed, pushed))
+    force_noise = h * (a.specific_force_noise * a.specific_force_noise + push)
     bias_noise = h * a.bias_walk * a.bias_walk
-    for index, noise in zip(
-        range(STATES), (tilt_noise, tilt_noise, 0.0, 0.0, bias_noise, bias_noise, bias_noise), strict=True
-    ):
+    noises = (tilt_noise, tilt_noise, force_noise, force_noise, bias_noise, bias_noise, bias_noise)
+    for index, noise in enumerate(noises):
         p[_ROW[index][index]] = p[_ROW[index][index]] + noise
 
     bound = a.velocity_bound * a.velocity_bound * (1.0 + a.velocity_adaptation * lately) / h

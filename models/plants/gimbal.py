@@ -54,6 +54,9 @@ class BodyAboutO(NamedTuple):
 Bodies = tuple[BodyAboutO, BodyAboutO, BodyAboutO]
 """Yaw frame, pitch frame, camera."""
 
+Forces6 = tuple[Vector3, Vector3, Vector3, Vector3, Vector3, Vector3]
+"""A force for each of six coordinates, N per unit acceleration."""
+
 
 class HeadMotion(NamedTuple):
     """Motion of the frame that carries the gimbal, in its own axes t."""
@@ -180,11 +183,12 @@ def inverse_dynamics(
     )
 
 
-def mass_matrix(bodies: Bodies, turns: Turns, height: Scalar, head: Vector3) -> Symmetric6:
-    """M of M(q) u' + h = tau for u = (w_nt_t, yaw rate, pitch rate, roll rate), by composite bodies.
+def mass_matrix(bodies: Bodies, turns: Turns, height: Scalar, head: Vector3) -> tuple[Symmetric6, Forces6]:
+    """M of M(q) u' + h = tau for u = (w_nt_t, yaw rate, pitch rate, roll rate), by composite bodies, and their forces.
 
-    height: O above the fixed point P (m); head: moments of inertia of the tripod's head about P (kg.m2).
-    Each joint's column is the wrench that a unit acceleration of it wants of all bodies it carries.
+    height: O above the ball's centre Q (m); head: moments of inertia of what turns with it about Q (kg.m2).
+    Each joint's column is the wrench that a unit acceleration of it wants of all bodies it carries; the forces, in t,
+    are what a unit acceleration of each coordinate wants of Q.
     Source: Featherstone, Rigid Body Dynamics Algorithms, section 6.2.
     """
     sp, cp, st, ct, sg, cg = turns
@@ -201,7 +205,7 @@ def mass_matrix(bodies: Bodies, turns: Turns, height: Scalar, head: Vector3) -> 
     ry, rz = ct * yy - st * yz, st * yy + ct * yz
     roll_yaw = -rz
     rx, ry = cp * xy + sp * ry, cp * ry - sp * xy
-    rfx, rfy = sz, st * sx
+    rfx, rfy, rfz = sz, st * sx, -ct * sx
     rfx, rfy = cp * rfx + sp * rfy, cp * rfy - sp * rfx
 
     # pitch frame and camera, in k
@@ -214,7 +218,7 @@ def mass_matrix(bodies: Bodies, turns: Turns, height: Scalar, head: Vector3) -> 
     xy, xz = ct * xy - st * xz, st * xy + ct * xz
     pitch_pitch, pitch_yaw = xx, -xz
     tx, ty, tz = cp * xx + sp * xy, cp * xy - sp * xx, xz
-    tfx, tfy = -sp * sz, -cp * sz
+    tfx, tfy, tfz = -sp * sz, -cp * sz, sy
 
     # all three, in t
     km, (kx, ky, kz), (kxx, kyy, kzz), (kxy, kxz, kyz) = yaw_frame
@@ -230,7 +234,9 @@ def mass_matrix(bodies: Bodies, turns: Turns, height: Scalar, head: Vector3) -> 
     yaw_row = (height * sx - xz, height * sy - yz, -zz, zz)
     pitch_row = (tx - height * tfy, ty + height * tfx, tz, pitch_yaw, pitch_pitch)
     roll_row = (rx - height * rfy, ry + height * rfx, rz, roll_yaw, roll_pitch, roll_roll)
-    return (*head_rows, *yaw_row, *pitch_row, *roll_row)
+    lever = sz + m * height
+    forces = ((0.0, -lever, sy), (lever, 0.0, -sx), (-sy, sx, 0.0), (sy, -sx, 0.0), (tfx, tfy, tfz), (rfx, rfy, rfz))
+    return (*head_rows, *yaw_row, *pitch_row, *roll_row), forces
 
 
 def first_moment(bodies: Bodies, turns: Turns) -> Vector3:

@@ -1,16 +1,16 @@
-"""Short torques: the shutter's blades and mirror, knocks against the tripod.
+"""Short loads: the shutter's blades and mirror, a finger on the button, knocks against the tripod.
 
-Each pulse is a half sine, given by the momentum that it has handed over so far. A solver step applies the mean torque
-over the step, the difference of momenta over the step's length: the impulse delivered is then exact, even for a pulse
-shorter than the step.
+Each pulse is given by the momentum that it has handed over so far. A solver step applies the mean over the step, the
+difference of momenta over the step's length: the impulse delivered is then exact, even for a pulse shorter than the
+step.
 """
 
 from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from ..record import Real
-from ..scalar import PI, Scalar, clip, cos, floor, maximum, where
+from ..record import Real, Vector3
+from ..scalar import PI, Scalar, clip, cos, floor, maximum, sin, where
 from .gimbal import Axes
 
 
@@ -47,6 +47,24 @@ class Knock(NamedTuple):
     width: Annotated[float, Real("s", "of the half sine", 1e-4, 1.0)] = 5e-3  # assumption
 
 
+class Press(NamedTuple):
+    """A finger that presses the camera's button and lets go: F (1 - cos(2 pi t/T))/2 downward.
+
+    Hand-borne vibration from a press lies at 2 Hz [S JJE 31(6) 399]: T = 0.5 s.
+    """
+
+    force: Annotated[float, Real("N", "largest; 0: a remote release", 0.0, 100.0)] = 0.0  # a button gives way at 2 to 4
+    # N, half of which the holding fingers take (assumption)
+    position: Annotated[Vector3, Real("m", "of the button, from O in camera axes", -1.0, 1.0, None, 0.01)] = (
+        0.05,
+        0.0,
+        0.035,
+    )  # top right of a body, assumption
+    start: Annotated[float, Real("s", "first press, after the start of the run", 0.0, 1e6)] = 4.8
+    period: Annotated[float, Real("s", "time between presses; 0: one only", 0.0, 1e6)] = 5.0
+    duration: Annotated[float, Real("s", "from touch to letting go", 1e-3, 100.0)] = 0.5
+
+
 def half_sine_share(since: Scalar, width: Scalar) -> Scalar:
     """Share of a half sine's area that has passed: (1 - cos(pi t/width))/2, 0 before and 1 after."""
     return 0.5 - 0.5 * cos(PI * clip(since / width, 0.0, 1.0))
@@ -62,6 +80,14 @@ def knock_share(knock: Knock, time: Scalar) -> Scalar:
     since = time - knock.start
     cycles = _cycles(since, knock.period)
     return cycles + half_sine_share(since - cycles * knock.period, knock.width)
+
+
+def press_share(press: Press, time: Scalar) -> Scalar:
+    """Number of presses that the camera has taken by `time` (s), each of the impulse F T/2; the running one in part."""
+    since = time - press.start
+    cycles = _cycles(since, press.period)
+    done = clip((since - cycles * press.period) / press.duration, 0.0, 1.0)
+    return cycles + done - sin(2.0 * PI * done) / (2.0 * PI)
 
 
 def _flung(since: Scalar, travel: Scalar, width: Scalar) -> Scalar:

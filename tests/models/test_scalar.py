@@ -39,3 +39,8 @@ def test_numpy_scalars_are_floats_too() -> None:
     assert scalar.both(x > 0.0, x < 1.0)
     assert scalar.either(x < 0.0, x < 1.0)
     assert scalar.sqrt(x) == 0.5
+
+
+def test_select_takes_an_item_and_is_nothing_outside() -> None:
+    assert [scalar.select(index, (3.0, -0.0, 5.0)) for index in (-1.0, 0.0, 1.0, 2.0, 3.0)] == [0.0, 3.0, 0.0, 5.0, 0.0]
+    assert math.copysign(1.0, scalar.select(1.0, (3.0, -0.0))) == 1.0

@@ -40,6 +40,20 @@ STEPS: tuple[tuple[int, Callable[[random.Random], float]], ...] = (
 SOONER: dict[str, Values] = {
     "AttitudeSensor": {"alignment.duration": 0.03, "solver.fusion.rest_time": 0.05, "filter.divider": 3},
     "TripodGimbal": {"shutter.start": 0.02, "shutter.period": 0.15, "knock.start": 0.05},
+    "Turntable": {
+        **{f"profile.row[{row}].duration": 0.02 for row in (1, 2, 3)},
+        **{
+            f"axis.{axis}.{limit}_limit": 50.0
+            for axis in ("outer", "middle", "inner")
+            for limit in ("rate", "acceleration")
+        },
+        **{f"{noise}.rms[{axis}]": 0.01 for noise in ("tilt", "shaking") for axis in (1, 2, 3)},
+        "profile.tolerance": 0.01,
+        "shock.start": 0.02,
+        "shock.peak[1]": 5.0,
+        "shock.pulses": 3,
+        "shock.period": 0.05,
+    },
 }
 """Centres of random parameters with which everything comes up within a short run, in every other case."""
 

@@ -116,7 +116,8 @@ def full(triangle: tuple[float, ...]) -> NDArray[np.float64]:
 def test_mass_matrix_holds_the_recursions_columns_and_is_positive_definite(seed: int) -> None:
     rng = np.random.default_rng(seed)
     bodies, turns, h, head = bodies_of(rng), turns_of(Axes(*vector(rng, 3.0))), 0.3, (0.03, 0.04, 0.05)
-    m = full(mass_matrix(bodies, turns, h, head))
+    triangle, forces = mass_matrix(bodies, turns, h, head)
+    m = full(triangle)
     for column in range(6):
         unit = [1.0 if i == column else 0.0 for i in range(6)]
         alpha, joints = (unit[0], unit[1], unit[2]), Axes(*unit[3:])
@@ -128,13 +129,14 @@ def test_mass_matrix_holds_the_recursions_columns_and_is_positive_definite(seed:
         for i in range(3):
             wanted[i] += head[i] * alpha[i]
         np.testing.assert_allclose(m[:, column], wanted, rtol=0.0, atol=1e-15)
+        np.testing.assert_allclose(forces[column], force, rtol=0.0, atol=1e-15)
     assert np.linalg.eigvalsh(m)[0] > 0.0
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_equations_are_solved(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    triangle = mass_matrix(bodies_of(rng), turns_of(Axes(*vector(rng, 3.0))), 0.3, (0.03, 0.04, 0.05))
+    triangle, _ = mass_matrix(bodies_of(rng), turns_of(Axes(*vector(rng, 3.0))), 0.3, (0.03, 0.04, 0.05))
     b = rng.standard_normal(6)
     x = solve_symmetric(triangle, tuple(b.tolist()))  # type: ignore[arg-type]
     np.testing.assert_allclose(x, np.linalg.solve(full(triangle), b), rtol=1e-10)
