@@ -19,6 +19,11 @@ Array = NDArray[np.float64]
 Bins = NDArray[np.int64]
 Complex = NDArray[np.complex128]
 
+_ROUNDING = 1e-12
+"""Of the largest value: a change that means nothing."""
+_SURELY = 0.98
+"""A share that noise hardly has, even at one line."""
+
 
 def schroeder_phases(count: int) -> Array:
     """phi_k = -pi k^2/n (M. R. Schroeder 1970): a low peak for sines of equal size on neighbouring lines."""
@@ -60,6 +65,10 @@ class Measured(NamedTuple):
 
     `even`, `odd` and `noise` (outputs,) are rms sizes of a line, relative to those of the sines: on even and on odd
     multiples of the sines' greatest common divisor, where no sine is, and of what changes from period to period.
+
+    `change` (bins, outputs) is the rms change from the first period to the last over the response, and `change_share`
+    half its square over the summed squares of all periods' deviations from their mean: `is_settling` judges by it
+    whether it is noise. Both want three periods, and are NaN with fewer.
     """
 
     response: Complex
@@ -68,12 +77,16 @@ class Measured(NamedTuple):
     even: Array
     odd: Array
     noise: Array
+    change: Array
+    change_share: Array
 
 
 def measured(given: Array, shown: Array, bins: Bins) -> Measured:
     """The response at the lines `bins` from periods given (R, P, N) and shown (R, P, N, outputs) in R realisations.
 
-    The variance is that of the scatter of periods, or of realisations where that is larger; NaN with one period only.
+    The variance E|error|^2 of the complex response is that of the scatter of periods, or of realisations where that is
+    larger; NaN with one period only. Coherence over all records is 1/(R P) on average where nothing follows the input;
+    NaN with one record, whose line always follows. Nonlinearity repeats with the period: R > 1 lowers it.
     """
     realisations, periods = given.shape[:2]
     driven = np.stack([lines(record) for record in given])[:, :, bins, None]
@@ -87,7 +100,36 @@ def measured(given: Array, shown: Array, bins: Bins) -> Measured:
     cross = np.abs((answer * driven.conj()).sum(axis=(0, 1))) ** 2
     power = (np.abs(answer) ** 2).sum(axis=(0, 1)) * (np.abs(driven) ** 2).sum(axis=(0, 1))
     coherence = np.divide(cross, power, out=np.zeros_like(cross), where=power > 0.0)
-    return Measured(response, np.fmax(within, between), coherence, *_beside(spectra, bins))
+    if realisations * periods < 2:
+        coherence[:] = math.nan
+    rounding = _ROUNDING * np.max(np.abs(shown), axis=(0, 1, 2)) / np.min(np.abs(driven), axis=(0, 1))
+    change, share = _change(ratio, rounding)
+    size = np.abs(response)
+    change = np.divide(change, size, out=np.zeros_like(change), where=size > 0.0)
+    return Measured(response, np.fmax(within, between), coherence, *_beside(spectra, bins), change, share)
+
+
+def _change(ratio: Complex, rounding: Array) -> tuple[Array, Array]:
+    """rms |last - first|, zero where that is rounding, and its share, of ratios (R, P, bins, outputs)."""
+    if ratio.shape[1] < 3:
+        return np.full(ratio.shape[2:], math.nan), np.full(ratio.shape[2:], math.nan)
+    change = (np.abs(ratio[:, -1] - ratio[:, 0]) ** 2).sum(axis=0)
+    scatter = (np.abs(ratio - ratio.mean(axis=1, keepdims=True)) ** 2).sum(axis=(0, 1))
+    share = np.divide(0.5 * change, scatter, out=np.zeros_like(change), where=scatter > 0.0)
+    size = np.sqrt(change / len(ratio))
+    return np.where(size > rounding, size, 0.0), share
+
+
+def is_settling(change_share: Array, realisations: int, periods: int) -> bool:
+    """Whether periods change in one direction rather than at random, from the shares at some lines.
+
+    Of noise the mean share is 1/(P - 1), of lines that follow a Beta distribution with R and R (P - 2); this asks for
+    three deviations more. Of a transient that dies slowly it is 6 (P - 1)/(P (P + 1)), that is 1 for three periods. One
+    that changes its sign from period to period is like noise, and like noise the scatter, so the variance, has it.
+    """
+    mean = 1.0 / (periods - 1)
+    deviation = mean * math.sqrt((periods - 2) / (realisations * (periods - 1) + 1) / change_share.size)
+    return float(np.mean(change_share)) > min(mean + 3.0 * deviation, _SURELY)
 
 
 def _scatter(values: Complex, axis: int) -> Array:

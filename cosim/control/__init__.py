@@ -23,9 +23,10 @@ States keep their dots. Everything is in SI units. What cannot be done is refuse
 """
 
 from ..errors import ExportRefusedError, LinearisationRefusedError, SystemRefusedError
+from .algebraic_loops import refuse_algebraic_loop
 from .continuous import continuous_ss
 from .export import controller_of, to_fmu
-from .fmu_systems import FmuSystem, fmu_nlsys, refuse_algebraic_loop
+from .fmu_systems import FmuSystem, fmu_nlsys
 from .frequency import MeasuredFrequencyResponse, fmu_frd
 from .linear import model_ss
 from .noise import ModelNoise, model_noise

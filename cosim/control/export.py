@@ -58,8 +58,10 @@ def to_fmu(
     `name`, else like the file. `options` are those of `controller_of`.
 
     Tick k = 1, 2, ... is at ``start + k dt``. It reads the inputs that hold then and gives y[k-1] of
-    ``control.forced_response`` for what it reads until the next tick. A master that sets the inputs of t[k] and steps
-    dt finds at t[k+1] the response to them: the FMU is K(z) / z to a Jacobi master of step dt.
+    ``control.forced_response`` for what it reads until the next tick: of a StateSpace to 1e-12 of the largest output,
+    of a TransferFunction as closely as the two realisations agree, whose rounding grows with poles that lie close
+    together. A master that sets the inputs of t[k] and steps dt finds at t[k+1] the response to them: the FMU is
+    K(z) / z to a Jacobi master of step dt.
 
     Raises `ExportRefusedError` for a system or options that make no controller, `BuildError`, and `ResultsError` for
     a file that cannot be written.

@@ -10,6 +10,7 @@ between steps: what a digital controller at that rate sees.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..errors import SystemRefusedError, did_you_mean
 from ..interface import Value, Variable
-from ..multisine import Bins, Measured, measured, multisine, odd_bins
+from ..multisine import Bins, Measured, is_settling, measured, multisine, odd_bins
 from .driven_fmu import Array, DrivenFmu, Signals
 
 Method = Literal["multisine", "stepped"]
@@ -37,6 +38,8 @@ _STEPPED_TURNS = 6
 _STEPPED_STEPS = 48
 """Least turns and steps of a record of a single sine."""
 _SHARE_OF_RANGE = 0.01
+_SETTLED = 0.005
+"""Relative change of the response from the first measured period to the last that is not spoken of."""
 
 
 class Distortion(NamedTuple):
@@ -54,9 +57,15 @@ class Distortion(NamedTuple):
 class MeasuredFrequencyResponse(ct.FrequencyResponseData):  # type: ignore[misc]
     """A measured response: `coherence` and `standard_error` (outputs, inputs, frequencies), `distortion`, `amplitude`.
 
-    The standard error is that of the complex response, from the scatter of periods and realisations, so that a sine of
-    it is the error of gain and of phase: ``standard_error/abs(frdata)`` is relative, and rad. NaN with one period.
+    The standard error is sqrt(E|G - true|^2) of the complex response, from the scatter of its N records, which are
+    periods times realisations. Gain (relative) and phase (rad) have 1/sqrt(2) of it each:
+    ``standard_error/abs(frdata)/sqrt(2)``. Coherence is 1/N on average where nothing follows the input; one realisation
+    does not show nonlinearity in it, which repeats with the period. Both are NaN with one record.
     `amplitude` (inputs,) is the largest value that each input was moved by.
+
+    >>> found = fmu_frd("dist/GimbalController.fmu", 0.002, [30, 100], "euler.yaw", "motor_torque.yaw", amplitude=1e-3)
+    >>> found.coherence.shape, found.standard_error.shape, found.distortion.odd.shape
+    ((1, 1, 2), (1, 1, 2), (1, 1))
     """
 
     def __init__(
@@ -158,6 +167,9 @@ def fmu_frd(
     of the range that the FMU declares, or of the nominal value, else 1. `coupling_delay` is that of `fmu_nlsys`.
     `progress` hears of the share that is done.
 
+    Warns where the response still changes from the first measured period to the last, by more than 0.5 % and in another
+    way than noise: the transient has not died. With fewer than three periods this cannot be told.
+
     Raises `SystemRefusedError` for what cannot be measured, `RunStoppedError` when the FMU fails.
 
     >>> import control
@@ -179,11 +191,12 @@ def fmu_frd(
         bench.rest(settle)
         done = 0.0
         total = float(sum(sines.length for sines in plan) * len(sizes))
+        longest = max(sines.length for sines in plan)
         table: list[list[Measured]] = []
         for place, size in enumerate(sizes):
             table.append([])
             for sines in plan:
-                table[-1].append(bench.measure(place, size, sines, max(each.length for each in plan)))
+                table[-1].append(bench.measure(place, size, sines, longest))
                 done += sines.length / total
                 if progress is not None:
                     progress(done)
@@ -192,7 +205,9 @@ def fmu_frd(
             "outputs": [port.label for port in fmu.outputs],
             "name": name or fmu.path.stem.replace(".", "_"),
         }
-        return _result(table, plan, fmu.dt, sizes, names)
+        found = _result(table, plan, fmu.dt, sizes, names)
+        _warn_of_settling(table, found, realisations, periods, bench.unused(longest) * dt)
+        return found
 
 
 def _result(
@@ -215,6 +230,26 @@ def _result(
         sizes,
         **names,
     )
+
+
+def _warn_of_settling(
+    table: list[list[Measured]], found: MeasuredFrequencyResponse, realisations: int, periods: int, transient: float
+) -> None:
+    if periods < 3:
+        return
+    worst, where = 0.0, ""
+    for row, label in zip(table, found.input_labels, strict=True):
+        change, share = (np.concatenate([getattr(one, field) for one in row]) for field in ("change", "change_share"))
+        for output, size in enumerate(np.sqrt(np.mean(change**2, axis=0))):
+            if size > max(worst, _SETTLED) and is_settling(share[:, output], realisations, periods):
+                worst, where = float(size), f"{found.output_labels[output]} from {label}"
+    if where:
+        warnings.warn(
+            f"{found.name}: the response of {where} changes by {100.0 * worst:.2g} % from the first measured period to "
+            f"the last: what went before has not died after {transient:.6g} s, or the output drifts. Give a longer "
+            "transient (s), and settle (s) if the FMU is not at rest at its start values",
+            stacklevel=3,
+        )
 
 
 def _check(method: str, periods: int, realisations: int, coupling_delay: int) -> None:
@@ -321,9 +356,13 @@ class _Bench:
         """Run (s) with the inputs at their start values."""
         self._run(np.tile(self._fmu.start_inputs, (round(duration / self._fmu.dt), 1)))
 
+    def unused(self, longest: int) -> int:
+        """Steps before a record; `longest` is the longest record of all."""
+        return longest if self._transient is None else round(self._transient / self._fmu.dt)
+
     def measure(self, place: int, size: float, sines: _Sines, longest: int) -> Measured:
         """The response to sines on one input; `longest` is the longest record of all, in steps."""
-        unused = longest if self._transient is None else round(self._transient / self._fmu.dt)
+        unused = self.unused(longest)
         shape = (self._realisations, self._periods, sines.length)
         given = np.empty(shape)
         shown = np.empty((*shape, len(self._fmu.outputs)))

@@ -11,19 +11,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import control  # type: ignore[import-untyped]
 import numpy as np
 
 from ..errors import LinearisationRefusedError
-from .folding import Fold, Places, Slim, closure, fold, reduced, regular, regular_calls, without_sums
+from .folding import (
+    SAME,
+    Fold,
+    Places,
+    Slim,
+    closure,
+    difference,
+    fold,
+    mean_shares,
+    reduced,
+    regular,
+    regular_calls,
+    with_inputs_before,
+    without_sums,
+)
 from .operating_point import SETTLE, STEADY, OperatingPoint, point_of, run_on, start_values
 from .stepping import (
     CLOCK_TOLERANCE,
+    Array,
     Compiled,
     Source,
     Timing,
+    choices,
     inputs_with,
     model_called,
     named,
@@ -38,6 +54,9 @@ Where = OperatingPoint | Mapping[str, float] | None
 
 Names = Sequence[str] | str | None
 """Names of signals, of which a stem stands for all its scalars; none: all that take part."""
+
+ClockPhase = Literal["mean", "tied"]
+"""Of clocks that slip against each other: the mean over all phases, or all ticks of nominally one moment at one."""
 
 _UNSTABLE = 1e-7
 """By how much an eigenvalue may lie outside the unit circle and still be an integrator's; a double one errs by 1e-8."""
@@ -62,6 +81,7 @@ def linear(
     inputs: Names,
     outputs: Names,
     clock_tolerance: float,
+    clock_phase: ClockPhase = "mean",
 ) -> Linear:
     """Everything that linear models and noise models have in common.
 
@@ -83,8 +103,11 @@ def linear(
         times = timing(compiled, dt, clock_tolerance)
         run_on(compiled, times, SETTLE / dt)
     point = point_of(compiled, dt)
-    folded = fold(compiled, regular_calls(compiled, times))
-    edges = _Edges(compiled, times, folded)
+    calls = regular_calls(compiled, times)
+    if clock_phase not in get_args(ClockPhase):
+        raise LinearisationRefusedError(f"clock_phase = {clock_phase!r}: one of {', '.join(get_args(ClockPhase))}")
+    folded = fold(compiled, calls, mean_shares(compiled, times, dt, calls) if clock_phase == "mean" else None)
+    edges = _Edges(compiled, times, folded, clock_tolerance)
     shown = _outputs(compiled, outputs)
     entered = _inputs(compiled, edges, inputs, shown, dt)
     return Linear(compiled, times, folded, np.array(entered, np.intp), np.array(shown, np.intp), point)
@@ -93,8 +116,8 @@ def linear(
 class _Edges:
     """What follows from what, in the regular tasks and in those that run less often or at odd times."""
 
-    def __init__(self, compiled: Compiled, times: Timing, folded: Fold) -> None:
-        self.compiled, self.times, self.folded = compiled, times, folded
+    def __init__(self, compiled: Compiled, times: Timing, folded: Fold, tolerance: float) -> None:
+        self.compiled, self.times, self.folded, self.tolerance = compiled, times, folded, tolerance
         self.often = set(regular(times))
         rows = folded.rows
         self.state, self.inputs = folded.A != 0.0, folded.B != 0.0
@@ -129,20 +152,40 @@ class _Edges:
         period = compiled.periods[task.clock] * compiled.every[odd[0]]
         guilty = [i for i in inputs if odd[0] in self.odd([i], outputs)]
         multiple = smallest_step(self.times, self.odd(guilty, outputs))
-        advice = (
-            f"choose dt = {multiple * dt:.15g} s"
-            if multiple
-            else f"set {', '.join(compiled.set_by(task.clock))} so that dt and this are whole multiples of each other"
-        )
+        advice = f"choose dt = {multiple * dt:.15g} s" if multiple else self._advice(guilty, outputs, dt)
         return LinearisationRefusedError(
             f"{compiled.model.name}: at dt = {dt:.15g} s the task {task.name} runs every {period:.6g} s, no whole "
             f"number of times in dt, and is on the way of {', '.join(names[i] for i in guilty)}: {advice}, "
             "or leave them out of the inputs"
         )
 
+    def _advice(self, inputs: Sequence[int], outputs: Sequence[int], dt: float) -> str:
+        """The sampling time near dt that the slowest odd task fits, and what to set for the rest of the way to fit it."""
+        compiled, way = self.compiled, self.between(inputs, outputs)
+        odd = self.odd(inputs, outputs)
+        slowest = max(compiled.periods[compiled.tasks[number].clock] * compiled.every[number] for number in odd)
+        better = max(round(dt / slowest), 1) * slowest
+        fitting = regular(timing(compiled, better, self.tolerance))
+        rows = self.folded.rows
+        misfits = {
+            compiled.tasks[number].clock: compiled.tasks[number].name
+            for number, step in enumerate(compiled.steps)
+            if way[np.searchsorted(rows, step.rows)].any() and number not in fitting and self.times.calls[number] != 0
+        }
+        ways = [f"choose dt = {better:.15g} s"]
+        for clock, task in misfits.items():
+            ways.append(f"set {listed(compiled.set_by(clock))} so that {task} runs every {better:.15g} s or a whole part")
+        task = compiled.tasks[odd[0]]
+        return f"{' and '.join(ways)}; or set {listed(compiled.set_by(task.clock))} so that {task.name} fits dt"
+
     def pace(self, place: int, outputs: Sequence[int]) -> float:
         """Sampling times that an input's way takes to come round, 1 where everything fits dt."""
         return smallest_step(self.times, self.odd([place], outputs)) or inf
+
+
+def listed(names: Sequence[str]) -> str:
+    """What to set."""
+    return ", ".join(names) or "the model's own constants"
 
 
 def _outputs(compiled: Compiled, wanted: Names) -> list[int]:
@@ -179,6 +222,7 @@ def model_ss(
     name: str | None = None,
     coupling_delay: int = 1,
     clock_tolerance: float = CLOCK_TOLERANCE,
+    clock_phase: ClockPhase = "mean",
     allow_unstable: bool = False,
     allow_drift: bool = False,
 ) -> control.StateSpace:
@@ -191,7 +235,9 @@ def model_ss(
 
     `inputs` are by default those that act at the pace of dt (what acts through slower clocks only, as temperature, is
     left out), `outputs` the real ones that respond. States have their FMI names, signals as well, with ``_`` for a dot.
-    Clocks within `clock_tolerance` of a whole ratio to dt are taken at it.
+    Clocks within `clock_tolerance` of a whole ratio to dt are taken at it. Those that miss it slip against the others:
+    with `clock_phase` "mean" they read the inputs at the mean over all phases, with "tied" at the one that is latest,
+    so that what they read is newest. An input that is read at several phases is a state, ``rate[1].before``.
 
     Raises `LinearisationRefusedError` for unknown names, for clocks that do not fit dt, for an operating point that
     moves (unless `allow_drift`) or is unstable (unless `allow_unstable`), each with what to do.
@@ -200,16 +246,21 @@ def model_ss(
     >>> sensor.dt, sensor.output_labels
     (0.002, ['rate_measured[1]', 'rate_measured[2]', 'rate_measured[3]'])
     """
-    found = linear(model, dt, parameters, operating_point, inputs, outputs, clock_tolerance)
-    folded, compiled = found.folded, found.compiled
+    found = linear(model, dt, parameters, operating_point, inputs, outputs, clock_tolerance, clock_phase)
+    compiled = found.compiled
+    folded = with_inputs_before(found.folded, compiled, found.inputs)
+    found = found._replace(folded=folded)
     B, C = folded.B[:, found.inputs], folded.C[found.outputs]
     cut = reduced(folded.A, B, C, start_values(found.point.outputs)[found.outputs])
+    if (inputs is None and not found.inputs.size) or (outputs is None and not cut.outputs.size):
+        raise _nothing_acts(found)
     if outputs is None:
         found = found._replace(outputs=found.outputs[cut.outputs])
     if not allow_drift:
         check_steady(found, cut.states)
     keep = cut.states
     slim = without_sums(folded.A[np.ix_(keep, keep)], B[keep], folded.C[np.ix_(found.outputs, keep)])
+    check_same(found, B, slim)
     system = state_space(found, keep, slim, name)
     if not allow_unstable:
         check_stable(compiled.model.name, system)
@@ -229,8 +280,24 @@ def state_space(found: Linear, keep: Places, slim: Slim, name: str | None) -> co
         name=name or compiled.model.name,
         inputs=[signal_name(compiled.input_names[i]) for i in found.inputs],
         outputs=[signal_name(compiled.output_names[i]) for i in found.outputs],
-        states=[compiled.state_names[folded.rows[i]] for i in keep[slim.states]],
+        states=[compiled.state_name(folded.rows[i]) for i in keep[slim.states]],
         remove_useless_states=False,
+    )
+
+
+def _nothing_acts(found: Linear) -> LinearisationRefusedError:
+    """The error for a system that would be empty, which names what chooses between ways through the model."""
+    model, names = found.compiled.model, found.compiled.input_names
+    idle = [names[i] for i in found.inputs] if found.inputs.size else names
+    chosen = [
+        f"{what} {'; '.join(found_choices)}"
+        for what, record in (("the parameter", model.Parameters), ("the input", model.Inputs))
+        if (found_choices := choices(record))
+    ]
+    advice = f": set {', or '.join(chosen)}, or" if chosen else ":"
+    return LinearisationRefusedError(
+        f"{model.name}: at this operating point {', '.join(idle) or 'no input'} acts on none of the outputs{advice} "
+        "choose inputs (operating_point) at which it does, away from limits"
     )
 
 
@@ -241,11 +308,22 @@ def check_steady(found: Linear, states: Places) -> None:
     relative = np.abs(change) / np.maximum(1.0, np.abs(folded.before[states]))
     if relative.max(initial=0.0) > STEADY:
         worst = int(np.argmax(relative))
-        label = compiled.state_names[folded.rows[states[worst]]]
+        label = compiled.state_name(folded.rows[states[worst]])
         raise LinearisationRefusedError(
             f"{compiled.model.name}: the operating point moves: state.{label} = {folded.before[states[worst]]:.6g} "
             f"changes by {change[worst]:.3g} in dt; choose inputs that hold it (operating_point with `hold`), a longer "
             "`settle`, or allow it (allow_drift=True)"
+        )
+
+
+def check_same(found: Linear, B: Array, slim: Slim) -> None:
+    """Raise `LinearisationRefusedError` where leaving states out has changed the response."""
+    folded = found.folded
+    error = difference(folded.A, B, folded.C[found.outputs], slim)
+    if not error < SAME:
+        raise LinearisationRefusedError(
+            f"{found.compiled.model.name}: leaving out idle states changes the frequency response by {error:.2g} of its "
+            f"largest (allowed: {SAME:.2g}); its numbers differ too much in size: choose fewer inputs and outputs"
         )
 
 

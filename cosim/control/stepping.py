@@ -204,6 +204,15 @@ class Compiled:
         self.output_names = tuple(leaf.name for leaf in leaves(model.Outputs))
         self.real_outputs = [i for i, leaf in enumerate(leaves(model.Outputs)) if isinstance(leaf.fact, Real)]
 
+    def __deepcopy__(self, _memo: Any) -> Compiled:
+        """Itself: compiled functions cannot be copied, and systems put their state in before each call."""
+        return self
+
+    def state_name(self, place: int) -> str:
+        """Of a state; beyond them, of the last value of an input."""
+        own = len(self.state_names)
+        return self.state_names[place] if place < own else f"{self.input_names[place - own]}.before"
+
     def draw_names(self, number: int) -> list[str]:
         """``task[draw]`` of each normal of a task, ``task.rounding[number]`` of each rounding error."""
         task, step = self.tasks[number], self.steps[number]
@@ -214,6 +223,15 @@ class Compiled:
     def set_by(self, clock: str) -> list[str]:
         """Names of the numbers that the period of a clock or the dividers of its tasks follow from."""
         return _parameters_behind(self.model, self.parameters, clock)
+
+
+def choices(record: type) -> list[str]:
+    """``name (item, item)`` of each enumeration that stands alone, not in a row of many."""
+    return [
+        f"{leaf.name} ({', '.join(item.name for item in leaf.fact.items)})"
+        for leaf in leaves(record)
+        if isinstance(leaf.fact, Enumeration) and "[" not in leaf.name
+    ]
 
 
 def _parameters_behind(model: Model, parameters: Any, clock: str) -> list[str]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import doctest
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
+from attitude_fmu.models import linear_controller as module
 from attitude_fmu.models.errors import ValueRefusedError
 from attitude_fmu.models.linear_controller import Controller, Signal, linear_controller
 from attitude_fmu.models.record import defaults, flatten, leaves, unflatten, with_defaults
@@ -193,3 +195,9 @@ def test_limits_can_be_tuned(error: Callable[..., Any]) -> None:
 def test_limits_that_cross_are_refused() -> None:
     with pytest.raises(ValueRefusedError, match=r"PI\.lower_limit\.torque = -0\.5 N\.m: above the upper limit"):
         run_of(pi_controller(0.5), **{"upper_limit.torque": -1.0})
+
+
+def test_the_example_runs_as_printed() -> None:
+    failed, attempted = doctest.testmod(module)
+    assert attempted > 0
+    assert not failed

@@ -97,3 +97,56 @@ def model(order: tuple[str, ...] = ("fast", "reading", "slow")) -> Model:
         ),
         seed=lambda p: p.seed,
     )
+
+
+class ChainParameters(NamedTuple):
+    slow: Annotated[float, Real("s", "period of the relay's clock", min=1e-6)] = 10.0
+
+
+class ChainCoefficients(NamedTuple):
+    slow: Annotated[float, Real("s", "period")]
+
+
+class ChainInputs(NamedTuple):
+    level: Annotated[float, Real("1", "what enters the line")] = 0.0
+
+
+class ChainOutputs(NamedTuple):
+    late: Annotated[float, Real("1", "end of the line")]
+    walk: Annotated[float, Real("1", "coloured noise")]
+    relayed: Annotated[float, Real("1", "the same, as a slower clock reads it")]
+
+
+def chained(samples: int) -> Model:
+    """A delay line of so many samples, every second, and coloured noise that a slower clock hands on."""
+    line = tuple[(Annotated[float, Real("1", "on its way")],) * samples]  # type: ignore[misc]
+    chain_state = NamedTuple(
+        "ChainState",
+        [
+            ("line", line),
+            ("walk", Annotated[float, Real("1", "coloured noise")]),
+            ("relayed", Annotated[float, Real("1", "as read")]),
+        ],
+    )
+
+    def step(x: Any, u: ChainInputs, _p: Any, _c: Any, w: tuple[Any, ...]) -> Any:
+        return x._replace(line=(u.level, *x.line[:-1]), walk=0.5 * x.walk + w[0])
+
+    def relay(x: Any, _u: Any, _p: Any, _c: Any, _w: Any) -> Any:
+        return x._replace(relayed=x.walk)
+
+    return Model(
+        name="Chain",
+        description="a delay line and a relay",
+        Parameters=ChainParameters,
+        Coefficients=ChainCoefficients,
+        Inputs=ChainInputs,
+        State=chain_state,
+        Outputs=ChainOutputs,
+        coefficients=lambda p: ChainCoefficients(p.slow),
+        initial_state=lambda _p, _c, _u: chain_state((0.0,) * samples, 0.0, 0.0),  # type: ignore[call-arg]
+        outputs=lambda x, _p, _c: ChainOutputs(x.line[-1], x.walk, x.relayed),
+        clocks=(Clock("each", lambda _c: 1.0), Clock("slow", lambda c: c.slow)),
+        tasks=(Task("step", "each", step, normals=1), Task("relay", "slow", relay)),
+        seed=lambda _p: 0,
+    )

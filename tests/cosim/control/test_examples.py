@@ -1,27 +1,52 @@
-"""The examples in the docstrings run and give what they say."""
+"""The examples in the docstrings run and give what they say, and whatever is public has one, here or in the docs."""
 
 from __future__ import annotations
 
 import doctest
 import importlib
+import inspect
+import re
+import typing
+from pathlib import Path
 
 import pytest
 
+from attitude_fmu.cosim import control
 
-@pytest.mark.parametrize("name", ["continuous", "linear", "noise", "nonlinear"])
-def test_the_examples_of_a_module_run(name: str) -> None:
-    module = importlib.import_module(f"attitude_fmu.cosim.control.{name}")
-    found = doctest.testmod(module)
-    assert found.attempted > 0
-    assert found.failed == 0
+ROOT = Path(__file__).parents[3]
+WITH_EXAMPLES = {
+    path.stem: text
+    for path in sorted((ROOT / "cosim" / "control").glob("*.py"))
+    if ">>> " in (text := path.read_text(encoding="utf-8"))
+}
 
 
-def test_the_example_of_the_operating_point_runs() -> None:
-    # the package's function of this name hides the module
-    from attitude_fmu.cosim.control import operating_point
+@pytest.mark.parametrize("name", WITH_EXAMPLES)
+def test_the_examples_of_a_module_run(name: str, dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = importlib.import_module(f"{control.__name__}.{name}")
+    (tmp_path / "dist").symlink_to(dist, target_is_directory=True)
+    monkeypatch.chdir(tmp_path)
+    failed, attempted = doctest.testmod(module)
+    assert attempted == len(re.findall(r"^ *>>> ", WITH_EXAMPLES[name], re.MULTILINE))
+    assert not failed
 
-    globs = {"operating_point": operating_point}
-    examples = doctest.DocTestFinder().find(operating_point, globs=globs)
-    results = [doctest.DocTestRunner().run(example) for example in examples]
-    assert sum(result.attempted for result in results) > 0
-    assert sum(result.failed for result in results) == 0
+
+def exampled() -> set[str]:
+    """Words of all examples that are run: of docstrings here, of the docs by test_documentation."""
+    docs = (ROOT / "docs" / "control.md").read_text(encoding="utf-8")
+    examples = re.findall(r"^```python\n(.*?)^```", docs, re.DOTALL | re.MULTILINE)
+    for text in WITH_EXAMPLES.values():
+        examples += re.findall(r"^ *(?:>>>|\.\.\.) (.*)", text, re.MULTILINE)
+    return set(re.findall(r"\w+", " ".join(examples)))
+
+
+@pytest.mark.parametrize("name", control.__all__)
+def test_what_is_public_has_an_example(name: str) -> None:
+    # a class is seen at work where a function that gives it is
+    public = [getattr(control, other) for other in control.__all__]
+    makers = [
+        function.__name__
+        for function in public
+        if inspect.isfunction(function) and typing.get_type_hints(function).get("return") is getattr(control, name)
+    ]
+    assert {name, *makers} & exampled()

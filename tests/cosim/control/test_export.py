@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import re
 import shutil
 import zipfile
@@ -16,14 +15,12 @@ import pytest
 from fmpy import extract, instantiate_fmu, read_model_description
 from fmpy.validation import validate_fmu
 
-from attitude_fmu.cosim.control import conditioning, export, realisation
 from attitude_fmu.cosim.control.export import controller_of, to_fmu
 from attitude_fmu.cosim.errors import ExportRefusedError
 from attitude_fmu.cosim.master import Order, simulate
 from attitude_fmu.cosim.system import Component, System, connect
 from attitude_fmu.fmu_src.build import build_all
 from attitude_fmu.fmu_src.catalogue import KINDS
-from attitude_fmu.models import linear_controller as controller_model
 from attitude_fmu.models.linear_controller import linear_controller
 from attitude_fmu.models.record import defaults, flatten, leaves, unflatten
 from attitude_fmu.models.system import Run
@@ -365,14 +362,6 @@ LAG = control.tf([1.0], [1.0, 1.0])
 def test_what_makes_no_controller_is_refused(system: Any, options: dict[str, Any], message: str) -> None:
     with pytest.raises(ExportRefusedError, match=message):
         controller_of(system, **options)
-
-
-@pytest.mark.parametrize("module", [conditioning, controller_model, export, realisation])
-def test_examples_of_the_functions_run(module: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = doctest.testmod(module)
-    assert result.attempted
-    assert not result.failed
 
 
 @pytest.mark.parametrize("name", ["Controller.zip", "1st.fmu", "lambda.fmu"])

@@ -6,6 +6,7 @@ import gc
 import math
 import shutil
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import control as ct
@@ -14,7 +15,7 @@ import pytest
 from fmpy import extract, instantiate_fmu, read_model_description
 from pendulum_building import build_pendulum
 
-from attitude_fmu.cosim.control.fmu_systems import FmuSystem, fmu_nlsys, refuse_algebraic_loop
+from attitude_fmu.cosim.control import FmuSystem, fmu_nlsys, refuse_algebraic_loop
 from attitude_fmu.cosim.errors import LinearisationRefusedError, RunStoppedError, SystemRefusedError
 
 STEP = 0.01
@@ -181,6 +182,93 @@ def test_nan_in_a_state_survives(system: FmuSystem) -> None:
     assert np.array_equal(system.dynamics(0.0, [0.0], [math.nan]), broken)
 
 
+def test_threads_that_share_a_system_take_turns(system: FmuSystem, pendulum: Path) -> None:
+    time = STEP * np.arange(1500)
+    given = np.random.default_rng(3).normal(size=(4, len(time)))
+    with fmu_nlsys(pendulum, STEP, "torque", ["angle", "rate", "count"]) as other:
+        alone = [ct.input_output_response(other, time, u).outputs for u in given]
+    with ThreadPoolExecutor(len(given)) as pool:
+        together = list(pool.map(lambda u: ct.input_output_response(system, time, u).outputs, given))
+    assert all(np.array_equal(*pair) for pair in zip(together, alone, strict=True))
+
+
+REMEMBERED = 40
+
+
+@pytest.fixture
+def forgetful(pendulum: Path) -> FmuSystem:
+    return fmu_nlsys(pendulum, STEP, "torque", ["angle", "rate", "count"], remembered=REMEMBERED)
+
+
+def test_a_long_run_takes_no_more_memory(forgetful: FmuSystem, system: FmuSystem) -> None:
+    time = STEP * np.arange(3000)
+    given = np.random.default_rng(4).normal(size=len(time))
+    found = ct.input_output_response(forgetful, time, given)
+    assert np.array_equal(found.outputs, ct.input_output_response(system, time, given).outputs)
+    states = forgetful._states
+    assert len(states._states) <= 2 * REMEMBERED + 1
+    assert len(states._following) <= 2 * REMEMBERED
+    assert len(states.fmu._saved) <= 2 * REMEMBERED + 1
+    for back in range(REMEMBERED):
+        assert np.array_equal(forgetful.output(0.0, found.states[:, -1 - back], [0.0]), found.outputs[:, -1 - back])
+    assert np.array_equal(forgetful.output(0.0, [0.0], [0.0]), found.outputs[:, 0])
+    with pytest.raises(SystemRefusedError, match=f"the last {REMEMBERED} that were used.*remembered="):
+        forgetful.output(0.0, found.states[:, 100], [0.0])
+
+
+def test_what_is_used_is_not_forgotten(forgetful: FmuSystem, system: FmuSystem) -> None:
+    # a tree of states: going on from one of the 8 last leaves, 3 steps at a time, uses fewer than 40 states
+    chance = np.random.default_rng(5)
+    leaves = [(np.zeros(1), np.zeros(1))]
+    for _ in range(600):
+        state, same = leaves[chance.integers(len(leaves))]
+        for u in chance.normal(size=(3, 1)):
+            state, same = forgetful.dynamics(0.0, state, u), system.dynamics(0.0, same, u)
+        assert np.array_equal(forgetful.output(0.0, state, [0.0]), system.output(0.0, same, [0.0]))
+        leaves = [*leaves, (state, same)][-8:]
+    assert len(forgetful._states._states) <= 2 * REMEMBERED + 1
+
+
+def test_a_state_that_is_gone_on_from_again_and_again_stays(forgetful: FmuSystem) -> None:
+    first = forgetful.dynamics(0.0, [0.0], [1.0])
+    second = forgetful.dynamics(0.0, first, [2.0])
+    third = forgetful.dynamics(0.0, second, [3.0])
+    shown = forgetful.output(0.0, second, [0.0])
+    for u in np.random.default_rng(6).normal(size=(5 * REMEMBERED, 1)):
+        forgetful.dynamics(0.0, second, u)  # looked for by the FMU
+        assert np.array_equal(forgetful.dynamics(0.0, second, [3.0]), third)  # known without it
+    assert np.array_equal(forgetful.output(0.0, second, [0.0]), shown)
+    assert np.array_equal(forgetful.dynamics(0.0, second, [3.0]), third)
+
+
+def test_many_states_outlive_those_they_came_from(pendulum: Path, system: FmuSystem) -> None:
+    # a chain, then a branch from each of its states, then the branches looked at: the chain is what is forgotten
+    count = 200
+    with fmu_nlsys(pendulum, STEP, "torque", ["angle", "rate", "count"], remembered=count) as bounded:
+        found = []
+        for one in (bounded, system):
+            chain = [np.zeros(1)]
+            for _ in range(count):
+                chain.append(one.dynamics(0.0, chain[-1], [1.0]))
+            branches = [one.dynamics(0.0, state, [5.0]) for state in chain[1:]]
+            for branch in branches:
+                one.output(0.0, branch, [0.0])
+            one.dynamics(0.0, branches[-1], [0.0])  # one too many
+            found.append([one.output(0.0, branch, [0.0]) for branch in branches[1:]])
+        with pytest.raises(SystemRefusedError, match="that were used"):
+            bounded.output(0.0, chain[1], [0.0])
+    assert np.array_equal(*found)
+
+
+def test_states_from_bytes_are_bounded_as_well(forgetful: FmuSystem) -> None:
+    state = forgetful.dynamics(0.0, [0.0], [1.0])
+    data, shown = forgetful.state_bytes(state), forgetful.output(0.0, state, [0.0])
+    for _ in range(300):
+        restored = forgetful.state_from(data)
+    assert len(forgetful._states.fmu._saved) <= 2 * REMEMBERED + 1
+    assert np.array_equal(forgetful.output(0.0, restored, [0.0]), shown)
+
+
 def test_start_time_is_the_fmus(slave: Callable[..., Path]) -> None:
     with fmu_nlsys(slave("integrator"), STEP, "u", "last_time", start_time=5.0) as late:
         response = ct.input_output_response(late, TIME, TORQUE)
@@ -306,6 +394,7 @@ def test_times_that_are_not_dt_apart_are_refused(system: FmuSystem) -> None:
         ({"parameters": {"damping": "much"}}, "damping = much: not a finite number"),
         ({"outputs": {"angle": "y", "rate": "y"}}, "two outputs are called y"),
         ({"coupling_delay": 2}, "control.tf([1], [1, 0], 0.01)"),
+        ({"remembered": 0}, "at least 1 state"),
     ],
 )
 def test_names_and_values_that_are_not_there_are_refused(
@@ -343,16 +432,6 @@ def test_an_input_that_the_fmu_refuses_leaves_the_system_whole(dist: Path) -> No
             sensor.dynamics(0.0, state, [25.0])
         assert np.array_equal(sensor.output(0.0, state, [300.0]), before)
         sensor.dynamics(0.0, state, [300.0])
-
-
-def test_an_algebraic_loop_is_told_by_name(pendulum: Path) -> None:
-    with fmu_nlsys(pendulum, STEP, "torque", "rate", name="swing", coupling_delay=0) as swing:
-        gain = ct.ss([], [], [], [[3.0]], STEP, name="brake")
-        with pytest.raises(SystemRefusedError, match=r"swing\.torque.*coupling_delay=1.*control\.tf") as caught:
-            refuse_algebraic_loop(ct.feedback(swing, gain))
-        assert "brake.u[0]" in str(caught.value)
-        refuse_algebraic_loop(ct.feedback(swing, ct.tf([3.0], [1.0, 0.0], STEP)))
-        refuse_algebraic_loop(ct.series(gain, swing))
 
 
 def test_a_whole_number_is_wanted_where_one_goes(pendulum: Path) -> None:

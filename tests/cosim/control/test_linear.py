@@ -82,6 +82,25 @@ def test_the_sampling_time_that_the_refusal_names_is_accepted() -> None:
     assert model_ss(PROBE, 10.0).input_labels == ["level", "offset"]
 
 
+def test_clocks_that_are_set_by_different_parameters_are_all_named_and_the_advice_is_accepted() -> None:
+    """ADIS16354 at 819.2 Hz under a processor at 500 Hz: both dt and the processor's period have to go."""
+    adis, dt = "AttitudeSensor_ADIS16354_150", 2.0 / 819.2
+    with pytest.raises(LinearisationRefusedError, match=rf"choose dt = {dt} s and set processor\.period"):
+        model_ss(adis, 0.002)
+    assert model_ss(adis, dt, {"processor.period": dt}).ninputs == 6
+    with pytest.raises(LinearisationRefusedError, match=r"choose dt = 1.414213 s and set fast .*; or set reading"):
+        model_ss(PROBE, 1.0, {"reading": 1.414213}, inputs="level")
+
+
+def test_an_empty_result_is_refused_with_what_to_set() -> None:
+    with pytest.raises(LinearisationRefusedError, match=r"command\.angle.* acts on none .*source \(profile, inputs\)"):
+        model_ss("Turntable", 0.001)
+    with pytest.raises(LinearisationRefusedError, match=r"command\.mode \("):
+        model_ss("Turntable", 0.001, inputs="command.angle")
+    with pytest.raises(LinearisationRefusedError, match="level acts on none"):
+        model_ss(PROBE, 1.0, {"limit": 1.0}, operating_point={"level": 3.0}, inputs="level")
+
+
 def test_inputs_that_act_through_slower_clocks_are_left_out_unless_asked_for() -> None:
     assert model_ss(PROBE, 1.0).input_labels == ["level"]
 
@@ -101,11 +120,12 @@ def test_a_growing_mode_is_refused_unless_allowed() -> None:
 
 
 def test_an_operating_point_that_moves_is_refused_unless_allowed() -> None:
-    falling = operating_point("TripodGimbal", 0.001, settle=1.0)
-    with pytest.raises(LinearisationRefusedError, match=r"moves: state\.\w+.*hold"):
-        model_ss("TripodGimbal", 0.001, operating_point=falling, allow_unstable=True)
-    system = model_ss("TripodGimbal", 0.001, operating_point=falling, allow_unstable=True, allow_drift=True)
-    assert system.ninputs == 3
+    at_rest = operating_point(PROBE, 1.0)
+    moving = at_rest._replace(state=at_rest.state._replace(lag=0.3))
+    with pytest.raises(LinearisationRefusedError, match=r"moves: state\.lag = 0\.3 .*hold"):
+        model_ss(PROBE, 1.0, operating_point=moving, inputs="level")
+    system = model_ss(PROBE, 1.0, operating_point=moving, inputs="level", allow_drift=True)
+    assert system.nstates == 2
 
 
 def test_what_cannot_be_held_is_refused() -> None:

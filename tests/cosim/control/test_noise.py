@@ -21,7 +21,7 @@ from attitude_fmu.cosim.control import (
 )
 
 sys.path.insert(0, str(Path(__file__).parent))
-from small_models import DRIFT_MEMORY, model
+from small_models import DRIFT_MEMORY, chained, model
 
 SENSOR = "AttitudeSensor_ADXRS450_ADXL355"
 QUIET_BIAS = {"gyro.bias_instability": 0.0}
@@ -34,7 +34,8 @@ def test_white_noise_of_a_register_is_its_variance_and_that_of_its_rounding() ->
     assert noise.names == ["noise_read[1]", "noise_read_rounding[1]"]
     np.testing.assert_allclose(noise.QN, np.diag([1.0, 1.0 / 12.0]))
     np.testing.assert_allclose(noise.covariance(), [[0.3**2 + 0.5**2 / 12.0]], rtol=1e-12)
-    np.testing.assert_array_equal(noise.RN, [[0.0]])
+    np.testing.assert_allclose(noise.RN, 1e-6 * noise.covariance(), rtol=1e-12)
+    assert not model_noise(PROBE, 1.0, {"noise": 0.3}, inputs="level", reading_noise=0.0).RN.any()
 
 
 def test_several_draws_in_a_sampling_time_are_inputs_of_their_own() -> None:
@@ -55,6 +56,18 @@ def test_noise_that_cannot_be_taken_at_the_sampling_time_is_refused_with_what_se
     plant = operating_point("TripodGimbal", 0.001, hold={"joint": 0.0}, free="motor_torque")
     with pytest.raises(LinearisationRefusedError, match=r"task wind.*set wind\.period"):
         model_noise("TripodGimbal", 0.001, operating_point=plant)
+
+
+def test_noise_that_a_slower_task_hands_on_is_refused_not_lost() -> None:
+    """A relay at a tenth of the pace of what it reads draws nothing itself."""
+    relay = chained(24)
+    for outputs in ("relayed", ["relayed", "walk"], None):
+        with pytest.raises(LinearisationRefusedError, match=r"task relay steps every 10 s.*hands on.*set slow"):
+            model_noise(relay, 1.0, inputs="level", outputs=outputs)
+    at_its_pace = model_noise(relay, 10.0, inputs="level", outputs="relayed")
+    np.testing.assert_allclose(at_its_pace.covariance(), [[1.0 / (1.0 - 0.5**2)]], rtol=1e-5)
+    beside = model_noise(relay, 1.0, inputs="level", outputs="walk")
+    np.testing.assert_allclose(beside.covariance(), [[1.0 / (1.0 - 0.5**2)]], rtol=1e-12)
 
 
 def test_noise_without_a_stationary_variance_is_refused() -> None:
@@ -135,7 +148,11 @@ def test_low_frequency_noise_is_the_datasheets_density(predicted: ModelNoise) ->
 
 
 def test_kalman_designs_of_python_control_take_the_matrices(predicted: ModelNoise) -> None:
-    """With the noise in the states RN is 0, and the estimator knows the rate no worse than the last reading."""
+    """From a wrong start the estimate comes to the noisy truth, and its error then has the covariance P.
+
+    The squared error of N readings scatters by sqrt(2/N) where they are independent; over 4 times that stands for their
+    correlation over the two readings of a window, and 3 axes are taken together.
+    """
     s = predicted.system
     L, P, poles = control.dlqe(s.A, predicted.G, s.C, predicted.QN, predicted.RN)
     assert L.shape == (s.nstates, 3)
@@ -143,11 +160,28 @@ def test_kalman_designs_of_python_control_take_the_matrices(predicted: ModelNois
     estimator = control.create_estimator_iosystem(
         predicted.driven, predicted.QN, predicted.RN, P0=P, control_indices=s.ninputs
     )
-    time = np.arange(50) * 0.002
-    rate = np.zeros((3, 50))
+    steps, draw = 1500, np.random.default_rng(7)
+    time = np.arange(steps) * 0.002
+    rate = np.zeros((3, steps))
     rate[0] = 0.1
-    plant = control.forced_response(s, time, rate)
-    given = np.vstack([plant.outputs, rate])
-    start = np.concatenate([np.zeros(s.nstates), P.ravel()])
-    estimate = control.input_output_response(estimator, time, given, start).outputs
-    np.testing.assert_allclose(estimate[: s.nstates, -1], plant.states[:, -1], atol=1e-9)
+    w = np.sqrt(np.diag(predicted.QN))[:, None] * draw.standard_normal((len(predicted.QN), steps))
+    plant = control.forced_response(predicted.driven, time, np.vstack([rate, w]))
+    v = np.sqrt(np.diag(predicted.RN))[:, None] * draw.standard_normal((3, steps))
+    far = np.concatenate([10.0 * np.sqrt(np.diag(P)), P.ravel()])
+    given = np.vstack([plant.outputs + v, rate])
+    estimate = control.input_output_response(estimator, time, given, far).outputs[: s.nstates]
+    error = s.C @ (estimate - plant.states)
+    late = error[:, steps // 2 :]
+    expected = np.trace(s.C @ P @ s.C.T)
+    assert np.square(error[:, :3]).sum(axis=0).max() > 5.0 * expected
+    np.testing.assert_allclose(np.square(late).sum(axis=0).mean(), expected, rtol=4.0 * sqrt(2.0 / late.size))
+
+
+@pytest.mark.parametrize("kind", ["gyro", "levelling", "fused"])
+@pytest.mark.parametrize("outputs", ["rate_measured", "euler"])
+def test_every_solvers_noise_gives_a_stable_estimator(kind: str, outputs: str) -> None:
+    noise = model_noise(SENSOR, 0.002, {"solver.kind": kind}, inputs="rate", outputs=outputs)
+    s = noise.system
+    _, P, poles = control.dlqe(s.A, noise.G, s.C, noise.QN, noise.RN)
+    assert max(abs(poles)) < 1.0
+    assert np.linalg.eigvalsh(P).min() > -1e-12 * np.abs(P).max()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import sys
 from pathlib import Path
 from typing import Any
@@ -107,6 +108,29 @@ def test_python_control_simulates_and_connects_it() -> None:
         lag = 0.8**4 * lag + (1.0 - 0.8**4) * 0.5 * (1.0 - shown)
         shown = 0.25 * np.floor(lag / 0.25 + 0.5)
     np.testing.assert_allclose(np.squeeze(found), expected, atol=1e-12)
+
+
+def test_copies_and_several_places_in_a_loop_do_not_disturb_each_other() -> None:
+    probe = model_nlsys(model(), 1.0, {"step": 1e-6}, inputs="level", outputs="value", noise=False, name="probe")
+    time, u = np.arange(8.0), np.ones(8)
+    alone = control.input_output_response(probe, time, u, probe.initial_state).outputs
+    for twin in (probe.copy(), copy.deepcopy(probe)):
+        np.testing.assert_array_equal(control.input_output_response(twin, time, u, probe.initial_state).outputs, alone)
+    both = control.InterconnectedSystem((probe, probe), inplist=[(0, 0), (1, 0)], outlist=[(0, 0), (1, 0)])
+    start = np.tile(probe.initial_state, 2)
+    found = control.input_output_response(both, time, np.vstack([u, 3.0 * u]), start).outputs
+    np.testing.assert_array_equal(found[0], alone)
+    np.testing.assert_allclose(found[1], 3.0 * alone, atol=4e-6)  # quantisers of 1e-6
+
+
+def test_a_loop_of_two_of_them_is_the_loop_of_their_linear_models() -> None:
+    probe = model_nlsys(model(), 1.0, {"step": 1e-9}, inputs="level", outputs="value", noise=False, name="probe")
+    linear = model_ss(model(), 1.0, {"step": 1e-9}, inputs="level", outputs="value")
+    time, u = np.arange(12.0), np.ones(12)
+    loop = control.feedback(probe, probe)
+    found = control.input_output_response(loop, time, u, np.tile(probe.initial_state, 2)).outputs
+    expected = control.forced_response(control.feedback(linear, linear), time, u).outputs
+    np.testing.assert_allclose(found, expected, atol=12e-9)  # a quantiser of 1e-9 each step
 
 
 def test_its_linearisation_is_exact_where_finite_differences_see_a_quantiser() -> None:
