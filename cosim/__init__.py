@@ -21,6 +21,7 @@
 `identification`   noise models from records: AR(1) fit, power spectrum, cross-correlation
 `allan`            Allan deviation of a record, and of the terms of noise in theory
 `bench`            drives one sensor FMU and reads its registers, fast
+`multisine`        signals of many sines, and the spectra of what answers them
 `characteristics`  what a sensor does, measured: noise, responses, calibration, temperature, codes
 `filter_claims`    what the datasheets say of the parts' digital filters
 `sheet_claims`     what the datasheets print as codes and random walks
@@ -28,6 +29,7 @@
 `sensor_findings`  all that is measured of a device
 `sensor_report`    the table of datasheet and modelled part
 `sensor_plot`      the pictures of a part
+`control`          models and FMUs as python-control's systems, and such systems as FMUs
 `command_line`     the command ``attitude-fmu``
 =================  =================================================================================
 """

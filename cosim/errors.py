@@ -11,6 +11,14 @@ class SystemRefusedError(AttitudeFmuError, ValueError):
     """A coupled system that cannot be read, or cannot run as it is described."""
 
 
+class LinearisationRefusedError(AttitudeFmuError, ValueError):
+    """A model that has no linear or sampled model of the kind that is asked for."""
+
+
+class ExportRefusedError(AttitudeFmuError, ValueError):
+    """A controller that cannot become an FMU as it is."""
+
+
 class ResultsError(AttitudeFmuError, OSError):
     """Results that cannot be written to or read from disk."""
 

@@ -85,7 +85,7 @@ class Slave:
             ) from error
         self.pointer = c_void_p(self.fmu.component)
         self._time, self._size = c_double(), c_double()
-        self._do_step = partial(self._function("fmi2DoStep"), self.pointer, self._time, self._size, c_int(1))
+        self._do_step = partial(self.function("fmi2DoStep"), self.pointer, self._time, self._size, c_int(1))
 
     def _instance(self, folder: Path) -> Any:
         # fmpy.instantiate_fmu would name every instance after its model
@@ -114,7 +114,8 @@ class Slave:
         said = self.said(_ERROR)
         return f"{error}{': ' + said if said else ''}"
 
-    def _function(self, name: str) -> Callable[..., int]:
+    def function(self, name: str) -> Callable[..., int]:
+        """A function of the FMU's library, its arguments to be given as ctypes has them."""
         # by index: FMPy holds the attribute of this name with its own argument types
         function = self.fmu.dll[name]
         function.restype = c_int
@@ -124,7 +125,7 @@ class Slave:
         """A get or set call for these variables, with `values` as its memory."""
         references = (c_uint32 * len(variables))(*[variable.reference for variable in variables])
         count, place = c_size_t(len(variables)), values.ctypes.data_as(c_void_p)
-        return Call(name, partial(self._function(name), self.pointer, references, count, place))
+        return Call(name, partial(self.function(name), self.pointer, references, count, place))
 
     def said(self, at_least: int) -> str:
         """The last few things that the FMU logged with a status of `at_least` or worse."""

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import casadi
 
 from ..models.record import flatten, leaves, unflatten
+from ..models.scalar import rounding_of_symbols
 from ..models.system import Model, Task
 from .errors import BuildError
 from .interface import Interface, interface_of
@@ -313,4 +314,59 @@ def trace(model: Model) -> Trace:
         derivatives,
         steps,
         _dependencies((coefficients, initial_state, outputs), symbols),
+    )
+
+
+class Running(NamedTuple):
+    """What runs with given parameters: the outputs, and one step for each task that does not rest.
+
+    `errors` are the rounding errors that come after the normals of each step in its ``arguments[1]``.
+    """
+
+    interface: Interface
+    outputs: Traced
+    tasks: tuple[Task, ...]
+    steps: tuple[Traced, ...]
+    errors: tuple[int, ...]
+
+
+def _with_errors(model: Model, symbols: _Symbols, task: Task, step: Callable[..., Any]) -> tuple[Traced, int]:
+    """A step in which rounding x to a whole number adds an error e to it, e being a further draw."""
+    errors: list[Any] = []
+
+    def passed(x: Any) -> Any:
+        errors.append(casadi.SX.sym("e"))
+        return x + errors[-1]
+
+    with rounding_of_symbols(passed):
+        traced = _step(model, symbols, task.name, task, step)
+    values, draws = traced.arguments
+    return traced._replace(arguments=(values, casadi.vertcat(draws, *errors))), len(errors)
+
+
+def trace_running(model: Model, parameters: Any, rounded: bool = True) -> Running:
+    """Call with symbols only what these parameters choose; `rounded` false lets signals pass where they are rounded.
+
+    Raises `BuildError` for a function that cannot be traced.
+    """
+    interface = interface_of(model)
+    symbols = _Symbols(model, interface)
+    chosen = [(task, step) for task in _by_clock(model) if (step := task.chosen(parameters)) is not None]
+    with _as_written():
+        if rounded:
+            steps = [(_step(model, symbols, task.name, task, step), 0) for task, step in chosen]
+        else:
+            steps = [_with_errors(model, symbols, task, step) for task, step in chosen]
+        with _told(model, "outputs"), rounding_of_symbols(lambda x: x) if not rounded else nullcontext():
+            shown = model.outputs(symbols.x, symbols.p, symbols.k)
+            values = _scalars(_filled(model, "outputs", model.Outputs, shown))
+    outputs = Traced(
+        "outputs", "What the model shows.", (symbols.v, casadi.SX(0, 1)), values, _places(interface.outputs)
+    )
+    return Running(
+        interface,
+        outputs,
+        tuple(task for task, _ in chosen),
+        tuple(step for step, _ in steps),
+        tuple(errors for _, errors in steps),
     )

@@ -7,7 +7,9 @@ Arithmetic operators and comparisons need no help; a choice that depends on a si
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 Scalar = Any  # float, or casadi.SX while tracing
@@ -140,8 +142,23 @@ def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
     return minimum(maximum(x, low), high)
 
 
+_rounded: ContextVar[Callable[[Scalar], Scalar] | None] = ContextVar("rounding of symbols", default=None)
+
+
+@contextmanager
+def rounding_of_symbols(rounded: Callable[[Scalar], Scalar]) -> Iterator[None]:
+    """Within it `round_half_up` of a symbol is ``rounded(x)``: a linear model lets signals pass there."""
+    token = _rounded.set(rounded)
+    try:
+        yield
+    finally:
+        _rounded.reset(token)
+
+
 def round_half_up(x: Scalar) -> Scalar:
     """Nearest whole number, halves upwards: floor(x + 1/2)."""
+    if not isinstance(x, _NUMBER) and (rounded := _rounded.get()) is not None:
+        return rounded(x)
     return floor(x + 0.5)
 
 

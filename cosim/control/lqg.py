@@ -1,0 +1,118 @@
+"""Linear-quadratic-Gaussian control of a discrete system, and its reduction.
+
+    x+ = A x + B u + w,   y = C x + v,   cov w = W, cov v = R
+    xf = xp + M (y - C xp),   xp+ = A xf + B u,   u = -K xf
+
+The estimate is corrected by the newest reading before it is used, so that the controller costs no sampling time.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg  # type: ignore[import-untyped]
+
+from .responses import Array
+
+_REGULAR = 1e-18
+"""Weight of every state in the regulator's cost, which keeps the equation regular where the cost sees nothing."""
+
+
+class Plant(NamedTuple):
+    """A system with its noise: x+ = A x + B u + w, y = C x + v; z = E x is what the control is about."""
+
+    A: Array
+    B: Array
+    C: Array
+    E: Array
+    W: Array
+    R: Array
+
+
+class Cost(NamedTuple):
+    """Sum of (q z_high)^2 + (leak q z)^2 + (effort u)^2, z_high being z above `corner` (Hz), first order.
+
+    `weights` q and `effort` have a number for each z and u.
+    """
+
+    corner: float
+    weights: Array
+    leak: float
+    effort: Array
+
+
+class Observer(NamedTuple):
+    """x+ = F x + Gy y + Gu u, v = H x + J y: an estimator with feedback, before its output v is fed back as u.
+
+    It is stable even where the controller alone is not. Gu is also the anti-windup gain: fed with what the motors
+    really give, the estimator is right whatever limits that.
+    """
+
+    F: Array
+    Gy: Array
+    Gu: Array
+    H: Array
+    J: Array
+
+    def controller(self) -> tuple[Array, Array, Array, Array]:
+        """A, B, C, D from y to u = v."""
+        return self.F + self.Gu @ self.H, self.Gy + self.Gu @ self.J, self.H, self.J
+
+
+def regulator(plant: Plant, cost: Cost, dt: float) -> tuple[Array, Array, Array]:
+    """K of u = -K (x, h), and the filter h+ = a h + b z whose state h is the low-passed z."""
+    n, m = len(plant.A), len(plant.E)
+    a = np.exp(-2.0 * np.pi * cost.corner * dt)
+    A = np.block([[plant.A, np.zeros((n, m))], [(1.0 - a) * plant.E, a * np.eye(m)]])
+    B = np.vstack([plant.B, np.zeros((m, plant.B.shape[1]))])
+    q = np.diag(cost.weights)
+    seen = np.vstack([np.hstack([q @ plant.E, -q]), cost.leak * np.hstack([q @ plant.E, np.zeros((m, m))])])
+    R = np.diag(cost.effort**2)
+    X = linalg.solve_discrete_are(A, B, seen.T @ seen + _REGULAR * np.eye(n + m), R)
+    K = np.linalg.solve(B.T @ X @ B + R, B.T @ X @ A)
+    return K, a * np.eye(m), (1.0 - a) * np.eye(m)
+
+
+def estimator(plant: Plant) -> tuple[Array, Array]:
+    """M of the corrected estimate xf = xp + M (y - C xp), and the standard deviations of y - C xp."""
+    Y = linalg.solve_discrete_are(plant.A.T, plant.C.T, plant.W, plant.R)
+    spread = plant.C @ Y @ plant.C.T + plant.R
+    return np.linalg.solve(spread, plant.C @ Y).T, np.sqrt(np.diag(spread))
+
+
+def lqg(plant: Plant, gain: tuple[Array, Array, Array], correction: Array) -> Observer:
+    """The controller of a `regulator`, whose states are the first of the plant's, and an `estimator`."""
+    K, a, b = gain
+    n, m, k = len(plant.A), len(a), K.shape[1] - len(a)
+    kept = np.eye(n) - correction @ plant.C
+    feedback = np.hstack([K[:, :k], np.zeros((len(K), n - k))])
+    low = b @ plant.E
+    return Observer(
+        np.block([[plant.A @ kept, np.zeros((n, m))], [low @ kept, a]]),
+        np.vstack([plant.A @ correction, low @ correction]),
+        np.vstack([plant.B, np.zeros((m, plant.B.shape[1]))]),
+        -np.hstack([feedback @ kept, K[:, k:]]),
+        -feedback @ correction,
+    )
+
+
+def truncated(observer: Observer, order: int, readings: Array, efforts: Array) -> Observer:
+    """The observer with `order` states by balanced truncation, its inputs y and u in units of `readings`, `efforts`.
+
+    Reducing the observer, not the controller, keeps what makes the loop stable: a controller may be unstable by itself.
+    """
+    F, Gy, Gu, H, J = observer
+    G = np.hstack([Gy * readings, Gu * efforts])
+    reached = _root(linalg.solve_discrete_lyapunov(F, G @ G.T))
+    seen = _root(linalg.solve_discrete_lyapunov(F.T, H.T @ H))
+    U, s, V = np.linalg.svd(seen.T @ reached)
+    r = min(order, int(np.sum(s > 1e-13 * s[0])))
+    scale = 1.0 / np.sqrt(s[:r])
+    T, back = reached @ V[:r].T * scale, (seen @ U[:, :r] * scale).T
+    return Observer(back @ F @ T, back @ Gy, back @ Gu, H @ T, J)
+
+
+def _root(P: Array) -> Array:
+    values, vectors = np.linalg.eigh(0.5 * (P + P.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
