@@ -174,7 +174,9 @@ class _Edges:
         }
         ways = [f"choose dt = {better:.15g} s"]
         for clock, task in misfits.items():
-            ways.append(f"set {listed(compiled.set_by(clock))} so that {task} runs every {better:.15g} s or a whole part")
+            ways.append(
+                f"set {listed(compiled.set_by(clock))} so that {task} runs every {better:.15g} s or a whole part"
+            )
         task = compiled.tasks[odd[0]]
         return f"{' and '.join(ways)}; or set {listed(compiled.set_by(task.clock))} so that {task.name} fits dt"
 

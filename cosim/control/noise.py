@@ -23,7 +23,18 @@ from scipy import linalg  # type: ignore[import-untyped]
 
 from ..errors import LinearisationRefusedError
 from .folding import Draw, Places, closure, reduced, with_inputs_before, without_sums
-from .linear import ClockPhase, Linear, Names, Where, check_same, check_stable, check_steady, linear, listed, state_space
+from .linear import (
+    ClockPhase,
+    Linear,
+    Names,
+    Where,
+    check_same,
+    check_stable,
+    check_steady,
+    linear,
+    listed,
+    state_space,
+)
 from .operating_point import start_values
 from .stepping import CLOCK_TOLERANCE, Array, Compiled, Source, signal_name
 
@@ -188,7 +199,7 @@ def _slow(found: Linear) -> _Map:
         moved[places] |= np.any(jacobian.draws.toarray() != 0.0, axis=1)
     moved = closure(follows, moved)
     seen = closure(follows.T, np.any(folded.C[found.outputs] != 0.0, axis=0))
-    held = (folded.A == np.eye(len(rows))).all(axis=1) & ~folded.G.any(axis=1)
+    held = (np.eye(len(rows)) == folded.A).all(axis=1) & ~folded.G.any(axis=1)
     A, G, draws = folded.A.copy(), folded.G, list(folded.draws)
     for number, jacobian in slower.items():
         places = np.searchsorted(rows, compiled.steps[number].rows)
