@@ -98,7 +98,7 @@ def reconciled(model: Model, parameters: list[float]) -> list[float]:
         low, high = rule.limits(unflatten(model.Parameters, found))
         place, start = places[rule.field]
         if not low <= found[place] <= high:
-            found[place] = min(max(start, low), high)
+            found[place] = type(start)(min(max(start, low), high))
     return found
 
 
