@@ -60,7 +60,7 @@ class Wind(NamedTuple):
         float, Real("1", "rms of the vertical gusts over mean speed, the Dryden model's sigma_w/V", 0.0, 1.0)
     ] = 0.136  # 0.1 of the wind at 20 ft (MIL-F-8785C), which blows 1.36 times as fast: log profile, roughness 0.03 m
     surface_drag: Annotated[
-        float, Real("1", "surface drag coefficient, the Davenport model's kappa", 0.0, 0.1, None, 0.01)
+        float, Real("1", "surface drag coefficient, the Davenport model's kappa", 1e-4, 0.1, None, 0.01)
     ] = 0.005  # open country [Davenport 1961]
     roughness: Annotated[float, Real("m", "of the ground; the log profile's", 1e-5, 0.2, None, 0.01)] = 0.03  # grass
     across: Annotated[float, Real("1", "rms across over rms along, Davenport's gusts only", 0.0, 2.0)] = (
