@@ -72,3 +72,9 @@ def cubic_gains(nonlinearity: Scalar, full_scale: Scalar) -> tuple[Scalar, Scala
 def bent(x: Scalar, gains: tuple[Scalar, Scalar]) -> Scalar:
     """x + c3 x^3 - c1 x."""
     return x + x * (gains[1] * (x * x) - gains[0])
+
+
+def straightened(y: Scalar, cubic: Scalar) -> Scalar:
+    """v of v + c v^3 = y by one Newton step from y, short of 3 (c y^2)^3 y; kept from dividing where c y^2 is large."""
+    square = cubic * (y * y)
+    return y - square * y / maximum(1.0 + 3.0 * square, 0.5)
