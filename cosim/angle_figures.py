@@ -20,6 +20,8 @@ TURN = 2.0 * PI
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart
 RAW, KALMAN, RC, SLOW, OURS, INK = "#999999", "#E69F00", "#0072B2", "#56B4E9", "#D55E00", "#333333"
+DEFAULT_COLOUR = "#009E73"
+"""Of our solution as it comes, `OURS` being that of the tuned one."""
 
 
 def degrees(results: Results, name: str) -> Array:

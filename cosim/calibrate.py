@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from attitude_fmu.fmu_src.build_messages import build_and_tell
 
@@ -30,6 +28,7 @@ from .calibration_schedule import (
     FMUS,
     FULL,
     QUICK,
+    TABLE_ERROR,
     Case,
     Piece,
     calibration_trials,
@@ -40,6 +39,7 @@ from .devices import device_parameters, sensor_parameters, write_sensor_paramete
 from .errors import RunStoppedError
 from .interface import Value, read_interface
 from .monte_carlo import Figures, Trial, run_trials
+from .progress import shown_progress
 
 _TRIALS = "trials"
 _VALUES, _COEFFICIENTS, _RESIDUALS, _PICTURE = "calibration.ssv", "calibration.csv", "residuals.csv", "calibration.png"
@@ -80,10 +80,10 @@ def calibrate(request: CalibrationRequest) -> Outcome:
     p: Parameters = defaults(with_defaults(Parameters, piece.parameters("")))
     first = calibration_trials(request.dist, piece, schedule)
     later = len(CASES) * len(schedule.verified)
-    with _progress(len(first) + later) as told:
+    with shown_progress("runs on the table", len(first) + later) as told:
         found = _figures(first, request.out, told)
         gyro, accelerometer = readings_of([found[trial.name] for trial in first], p)
-        calibration = calibrated(gyro, accelerometer, p, MODEL.coefficients(p))
+        calibration = calibrated(gyro, accelerometer, p, MODEL.coefficients(p), TABLE_ERROR)
         values = compensation(calibration.gyro.coefficients, calibration.accelerometer.coefficients)
         cases = verification_trials(request.dist, piece, schedule, values)
         runs = [trial for trials in cases.values() for trial in trials]
@@ -112,22 +112,6 @@ def _figures(trials: Sequence[Trial], out: Path, told: Callable[[int], None]) ->
             raise
         message = f"stopped by the user; the same command goes on from the runs in {out / _TRIALS}"
         raise RunStoppedError(message, error.time, interrupted=True) from None
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[int], None]]:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    console = Console(stderr=True)
-    with Progress(
-        *columns,
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as bar:
-        task = bar.add_task("runs on the table", total=total)
-        yield lambda done: bar.update(task, completed=done)
 
 
 # --- showing ----------------------------------------------------------------------------------------------------------

@@ -2,12 +2,13 @@
 
 Axis i of a part (gyros or accelerometers) is taken to read
 
-    y_i = (1 + k_i d) S_i x + b_i + b1_i d + b2_i d^2 + G_i f + u + e,    d = T - 25 degC
+    y_i = v_i + c_i v_i^3 + b_i + b1_i d + b2_i d^2 + G_i f + u + e,    v_i = (1 + k_i d) S_i x,    d = T - 25 degC
 
 of the true x (rate or specific force) at specific force f, T being what the part's own thermometer reads, its constant
 error included. u is the same as long as the part stays switched on (turn-on bias, slow flicker), e is anew in every
 interval. Their variances tau^2 and sigma^2/duration are estimated from the residuals (Henderson's method 3), and weigh
-the fit: a calibration that took each interval for independent would believe its biases far too much.
+the fit: a calibration that took each interval for independent would believe its biases far too much. What the table
+itself does wrong looks like an error of the part, time and again; standard errors count it by the table's accuracy.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from .identification import RecordUnusableError
 Array = NDArray[np.float64]
 
 _STEPS = 4
-"""Gauss-Newton steps. The model is bilinear, with a drift of scale far below 1: three reach rounding."""
+"""Gauss-Newton steps. Drift of scale and cubic are far below 1, the rest is linear: three reach rounding."""
 
 _WORST_CONDITION = 1e8
 """Of the scaled equations: beyond it a coefficient is as good as undetermined."""
@@ -49,12 +50,13 @@ class Readings(NamedTuple):
 class ErrorModel(NamedTuple):
     """Coefficients of a triad, or their standard errors; rows are the part's axes. Units: the part's own, and K.
 
-    `sensitivity` (3, 3) is S, `scale_temperature_slope` (3) k, `bias`, `bias_temperature_slope` and
+    `sensitivity` (3, 3) is S, `scale_temperature_slope` (3) k, `cubic` (3) c, `bias`, `bias_temperature_slope` and
     `bias_temperature_curve` (3) the bias with temperature, `g_sensitivity` (3, 3) G.
     """
 
     sensitivity: Array
     scale_temperature_slope: Array
+    cubic: Array
     bias: Array
     bias_temperature_slope: Array
     bias_temperature_curve: Array
@@ -76,18 +78,30 @@ class Fit(NamedTuple):
     scatter: Array
 
 
-def fit(readings: Readings, *, g_sensitivity: bool) -> Fit:
+def fit(readings: Readings, *, g_sensitivity: bool, table_error: float = 0.0) -> Fit:
     """The coefficients that bring model and readings together, weighted least squares; G is zero unless asked for.
+
+    An attitude that is wrong by `table_error` (rad) turns the largest truth X by as much: it adds that to the standard
+    errors of S, over X^2 to those of c and times X to those of b, as independent.
 
     Raises `RecordUnusableError` if the intervals do not determine them.
     """
     axes = [_fit_axis(axis, readings, g_sensitivity) for axis in range(3)]
     return Fit(
         _error_model([axis.value for axis in axes]),
-        _error_model([axis.error for axis in axes]),
+        _with_table(_error_model([axis.error for axis in axes]), table_error, readings),
         np.array([axis.condition for axis in axes]),
         np.array([axis.noise for axis in axes]),
         np.array([axis.scatter for axis in axes]),
+    )
+
+
+def _with_table(errors: ErrorModel, table_error: float, r: Readings) -> ErrorModel:
+    largest = float(np.max(np.linalg.norm(r.true, axis=1)))
+    return errors._replace(
+        sensitivity=np.hypot(errors.sensitivity, table_error),
+        cubic=np.hypot(errors.cubic, table_error / largest**2),
+        bias=np.hypot(errors.bias, table_error * largest),
     )
 
 
@@ -104,13 +118,16 @@ class Calibration(NamedTuple):
         return getattr(self, name), getattr(self, f"true_{name}")
 
 
-def calibrated(gyro: Readings, accelerometer: Readings, p: Parameters, k: Coefficients) -> Calibration:
+def calibrated(
+    gyro: Readings, accelerometer: Readings, p: Parameters, k: Coefficients, table_error: float
+) -> Calibration:
     """Both parts fitted, beside what a piece with these parameters and coefficients truly has.
 
+    `table_error` (rad) is what the table's attitude may be wrong by; it is nothing beside the noise of gyros.
     Raises `RecordUnusableError` if the intervals do not determine the coefficients.
     """
-    fits = fit(gyro, g_sensitivity=True), fit(accelerometer, g_sensitivity=False)
-    return Calibration(*fits, *true_errors(p, k, gyro, accelerometer))
+    fits = fit(gyro, g_sensitivity=True), fit(accelerometer, g_sensitivity=False, table_error=table_error)
+    return Calibration(*fits, *true_errors(p, k))
 
 
 def compensation(gyro: ErrorModel, accelerometer: ErrorModel) -> dict[str, float]:
@@ -124,7 +141,7 @@ def compensation(gyro: ErrorModel, accelerometer: ErrorModel) -> dict[str, float
 
 
 def _of_part(part: str, found: ErrorModel) -> dict[str, float]:
-    vectors = ("scale_temperature_slope", "bias", "bias_temperature_slope", "bias_temperature_curve")
+    vectors = ("scale_temperature_slope", "cubic", "bias", "bias_temperature_slope", "bias_temperature_curve")
     values = _matrix(f"{part}_matrix", np.asarray(np.linalg.inv(found.sensitivity), dtype=np.float64))
     for name in vectors:
         values.update({f"{part}_{name}[{i}]": x for i, x in enumerate(getattr(found, name), 1)})
@@ -138,32 +155,28 @@ def _matrix(name: str, rows: Array) -> dict[str, float]:
 # --- what a modelled piece truly has ---------------------------------------------------------------------------------
 
 
-def true_errors(
-    p: Parameters, k: Coefficients, gyro: Readings, accelerometer: Readings
-) -> tuple[ErrorModel, ErrorModel]:
-    """What a flawless fit over these readings would find for a modelled piece: gyros, accelerometers.
+def true_errors(p: Parameters, k: Coefficients) -> tuple[ErrorModel, ErrorModel]:
+    """What a flawless fit would find for a modelled piece: gyros, accelerometers.
 
-    Over a thermometer that reads e too much: S (1 - k e), k/(1 - k e), b - b1 e + b2 e^2, b1 - 2 b2 e. The cubic
-    nonlinearity counts as the straight line through it, rectification as the bias that 1 g makes of it.
+    Over a thermometer that reads e too much: S (1 - k e), k/(1 - k e), b - b1 e + b2 e^2, b1 - 2 b2 e. Where
+    the part makes (1 - c1) v + c3 v^3 of v, c is c3/(1 - c1)^3; rectification counts as the bias that 1 g makes of it.
     """
     return (
-        _true_of(p.gyro, k.gyro, gyro, np.array(k.gyro.g_sensitivity)),
-        _true_of(p.accelerometer, k.accelerometer, accelerometer, np.zeros((3, 3))),
+        _true_of(p.gyro, k.gyro, np.array(k.gyro.g_sensitivity)),
+        _true_of(p.accelerometer, k.accelerometer, np.zeros((3, 3))),
     )
 
 
-def _true_of(part: Any, k: Any, readings: Readings, pushed: Array) -> ErrorModel:
+def _true_of(part: Any, k: Any, pushed: Array) -> ErrorModel:
     error = part.thermometer.error
     bias, slope, curve = (np.array(x) for x in (part.bias, part.bias_temperature_slope, part.bias_temperature_curve))
     drift, sensitivity = np.array(part.scale_temperature_slope), np.array(k.sensitivity)
     linear, cubic = k.cubic[:2]
-    square = (readings.true @ sensitivity.T) ** 2
-    weighted = readings.duration[:, None] * square
-    gain = 1.0 - linear + cubic * np.sum(weighted * square, axis=0) / np.sum(weighted, axis=0)
-    at_25 = 1.0 - drift * error
+    gain, at_25 = 1.0 - linear, 1.0 - drift * error
     return ErrorModel(
         (gain * at_25)[:, None] * sensitivity,
         drift / at_25,
+        np.full(3, cubic / gain**3),
         bias - slope * error + curve * error**2 + np.array(part.rectification) * STANDARD_GRAVITY**2,
         slope - 2.0 * curve * error,
         curve,
@@ -175,7 +188,7 @@ def _true_of(part: Any, k: Any, readings: Readings, pushed: Array) -> ErrorModel
 
 
 class _AxisFit(NamedTuple):
-    """Of one axis: coefficients in the order S, k, b, b1, b2 and perhaps G, and what else `Fit` has of it."""
+    """Of one axis: coefficients in the order S, k, c, b, b1, b2 and perhaps G, and what else `Fit` has of it."""
 
     value: Array
     error: Array
@@ -185,13 +198,14 @@ class _AxisFit(NamedTuple):
 
 
 def _error_model(axes: list[Array]) -> ErrorModel:
-    rows = np.array([np.pad(axis, (0, 10 - len(axis))) for axis in axes])
-    return ErrorModel(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5], rows[:, 6], rows[:, 7:])
+    rows = np.array([np.pad(axis, (0, 11 - len(axis))) for axis in axes])
+    drift, cubic, *bias = rows[:, 3:8].T
+    return ErrorModel(rows[:, :3], drift, cubic, bias[0], bias[1], bias[2], rows[:, 8:])
 
 
 def _fit_axis(axis: int, r: Readings, g_sensitivity: bool) -> _AxisFit:
     """Gauss-Newton from a flawless axis; the weights follow from the residuals of each step."""
-    value = np.zeros(10 if g_sensitivity else 7)
+    value = np.zeros(11 if g_sensitivity else 8)
     value[axis] = 1.0
     for _ in range(_STEPS):
         jacobian, residual = _linearised(value, axis, r)
@@ -206,11 +220,14 @@ def _linearised(value: Array, axis: int, r: Readings) -> tuple[Array, Array]:
     d = r.warmth
     responded = r.true @ value[:3]
     scaled = 1.0 + value[3] * d
-    columns = [scaled[:, None] * r.true, np.column_stack((d * responded, np.ones_like(d), d, d**2))]
-    said = scaled * responded + columns[1][:, 1:] @ value[4:7]
-    if len(value) > 7:
+    v = scaled * responded
+    slope = 1.0 + 3.0 * value[4] * v**2
+    offsets = np.column_stack((np.ones_like(d), d, d**2))
+    columns = [(slope * scaled)[:, None] * r.true, np.column_stack((slope * d * responded, v**3)), offsets]
+    said = v + value[4] * v**3 + offsets @ value[5:8]
+    if len(value) > 8:
         columns.append(r.specific_force)
-        said = said + r.specific_force @ value[7:]
+        said = said + r.specific_force @ value[8:]
     return np.hstack(columns), r.read[:, axis] - said
 
 

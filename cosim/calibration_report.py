@@ -45,6 +45,7 @@ _UNITS: dict[Part, dict[str, _Unit]] = {
     "gyro": {
         "sensitivity": _SHARE,
         "scale_temperature_slope": _DRIFT,
+        "cubic": _Unit("s2/rad2", "% at 100 deg/s", 0.01 * (100.0 * _DEG) ** -2),
         "bias": _Unit("rad/s", "deg/s", _DEG),
         "bias_temperature_slope": _Unit("rad/(s.K)", "mdeg/s/K", 1e-3 * _DEG),
         "bias_temperature_curve": _Unit("rad/(s.K2)", "mdeg/s/K2", 1e-3 * _DEG),
@@ -53,6 +54,7 @@ _UNITS: dict[Part, dict[str, _Unit]] = {
     "accelerometer": {
         "sensitivity": _SHARE,
         "scale_temperature_slope": _DRIFT,
+        "cubic": _Unit("s4/m2", "% at 1 g", 0.01 * STANDARD_GRAVITY**-2),
         "bias": _Unit("m/s2", "mg", _MILLI_G),
         "bias_temperature_slope": _Unit("m/(s2.K)", "ug/K", 1e-3 * _MILLI_G),
         "bias_temperature_curve": _Unit("m/(s2.K2)", "ug/K2", 1e-3 * _MILLI_G),
@@ -62,6 +64,7 @@ _UNITS: dict[Part, dict[str, _Unit]] = {
 
 _WORDS = {
     "scale_temperature_slope": "scale drift",
+    "cubic": "cubic",
     "bias": "bias at 25 degC",
     "bias_temperature_slope": "bias drift",
     "bias_temperature_curve": "bias curve",

@@ -46,9 +46,9 @@ FMUS = ("Turntable", "AttitudeSensor")
 _DEG = PI / 180.0
 _RATE_LIMIT, _ACCELERATION_LIMIT = 60.0 * _DEG, 60.0 * _DEG
 _FAST, _SLOW = 60.0 * _DEG, 20.0 * _DEG
-_REST = 10.0
-"""s in each position."""
-_VERIFIED_REST = 5.0
+TABLE_ERROR = 5.0 / 3600.0 * _DEG
+"""rad, of the attitude that the encoders tell: the tolerances of axes and encoders together (engineering judgement)."""
+
 _SETTLING = 0.2
 """s at the start of an interval in which the filters of the parts run empty; the slowest takes 0.04 s."""
 
@@ -61,12 +61,15 @@ _VERIFIED = (-40.0, -24.0, -8.0, 8.0, 24.0, 40.0)
 
 
 class Schedule(NamedTuple):
-    """Temperatures (degC), how often the device is switched on at each of the first, and the seed of all noise."""
+    """Temperatures (degC), how often the device is switched on at each of the first, the seed of all noise, and how
+    long (s) it rests in each position of the calibration and of the verification."""
 
     calibrated: tuple[float, ...] = (-5.0, 5.0, 15.0, 25.0, 35.0, 45.0, 55.0, 65.0)
     verified: tuple[float, ...] = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
     power_ups: int = 2
     seed: int = 1
+    rest: float = 10.0
+    verified_rest: float = 5.0
 
 
 FULL = Schedule()
@@ -99,14 +102,14 @@ def _direction(signs: tuple[int, ...]) -> str:
     return "".join(f"{'+' if sign > 0 else '-'}{axis}" for sign, axis in zip(signs, "xyz", strict=True) if sign) + " up"
 
 
-def calibration_profile(celsius: float) -> Profile:
+def calibration_profile(celsius: float, rest: float) -> Profile:
     """Rests and turns at one temperature of the chamber."""
     rows: list[ProfileRow] = []
     for signs in itertools.product((0, 1, -1), repeat=3):
         if not any(signs):
             continue
         label = _direction(signs)
-        rows.append(move(label, _toward(*signs), _REST, temperature=celsius + 273.15))
+        rows.append(move(label, _toward(*signs), rest, temperature=celsius + 273.15))
         if sum(map(abs, signs)) == 1:
             rate = _FAST if sum(signs) > 0 else _SLOW
             for way, about in ((1.0, "clockwise"), (-1.0, "back")):
@@ -119,7 +122,7 @@ def calibration_trials(dist: Path, piece: Piece, schedule: Schedule) -> list[Tri
     """A run for each temperature and power-up, each with noise of its own."""
     trials = []
     for number, (celsius, again) in enumerate(itertools.product(schedule.calibrated, range(schedule.power_ups))):
-        profile = calibration_profile(celsius)
+        profile = calibration_profile(celsius, schedule.rest)
         system = _bench(dist, piece, profile, schedule.seed + number)
         name = f"calibration/{celsius:g}_degC_{again + 1}"
         trials.append(_trial(name, system, profile, partial(calibration_means, profile), _CALIBRATION_RECORD))
@@ -217,10 +220,10 @@ _VERIFICATION_RECORD = (
 )
 
 
-def verification_profile(celsius: float) -> Profile:
+def verification_profile(celsius: float, rest: float) -> Profile:
     """Rests over +-40 deg of pitch and roll at one temperature."""
     rows = [
-        move(f"pitch {pitch:g} deg, roll {roll:g} deg", Axes(0.0, pitch * _DEG, roll * _DEG), _VERIFIED_REST)
+        move(f"pitch {pitch:g} deg, roll {roll:g} deg", Axes(0.0, pitch * _DEG, roll * _DEG), rest)
         for pitch in _VERIFIED
         for roll in (_VERIFIED if _VERIFIED.index(pitch) % 2 == 0 else _VERIFIED[::-1])
     ]
@@ -242,7 +245,7 @@ def verification_trials(
     }
     trials: dict[Case, list[Trial]] = {case: [] for case in CASES}
     for number, celsius in enumerate(schedule.verified):
-        profile = verification_profile(celsius)
+        profile = verification_profile(celsius, schedule.verified_rest)
         for case in CASES:
             system = _bench(dist, piece, profile, schedule.seed + 100_000 + number).with_values(case, given[case])
             take = partial(verification_errors, profile)

@@ -4,12 +4,14 @@
     figures = run_trials(trials, Path("out/trials"))
 
 What a trial gave lies in a file of its name, with the key of all that it follows from: the bytes of its FMUs, their
-connections and values, the experiment, and the function that takes the figures with every source file of its folder. An
-interrupted study goes on where it stopped; a trial whose key has changed is run again.
+connections and values, the experiment, and the function that takes the figures with the source of its module and of
+those that this imports from its own folder, and so on. An interrupted study goes on where it stopped; a trial whose key
+has changed is run again.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import inspect
 import multiprocessing
@@ -181,16 +183,39 @@ def _content(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _sources(folder: Path) -> tuple[tuple[str, str], ...]:
-    """Name and content of every Python file in a folder: a function counts on its neighbours too."""
-    return tuple((path.name, _content(path)) for path in sorted(folder.glob("*.py")))
+def _sources(module: Path) -> tuple[tuple[str, str], ...]:
+    """Name and content of a module and of all in its folder that it counts on, through imports of imports."""
+    found: set[Path] = set()
+    waiting = {module}
+    while waiting:
+        found |= waiting
+        waiting = {path for one in waiting for path in _neighbours(one)} - found
+    return tuple((path.name, _content(path)) for path in sorted(found))
+
+
+def _neighbours(module: Path) -> Iterator[Path]:
+    """The modules of the same folder that a module imports."""
+    for name in _imported(ast.parse(module.read_bytes())):
+        path = module.with_name(f"{name}.py")
+        if path.is_file():
+            yield path
+
+
+def _imported(tree: ast.Module) -> Iterator[str]:
+    """Last names of the modules imported absolutely or from the same package."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import(names=names) | ast.ImportFrom(module=None, names=names, level=1):
+                yield from (one.name.rpartition(".")[2] for one in names)
+            case ast.ImportFrom(module=str(name), level=0 | 1):
+                yield name.rpartition(".")[2]
 
 
 def _code(take: Take, sources: Callable[[Path], Any]) -> tuple[Any, ...]:
-    """The function and its fixed arguments, and the sources beside it."""
+    """The function and its fixed arguments, and the sources that it counts on."""
     if isinstance(take, partial):
         return (*_code(take.func, sources), take.args, sorted(take.keywords.items()))
-    return take.__module__, take.__qualname__, sources(Path(inspect.getfile(take)).parent)
+    return take.__module__, take.__qualname__, sources(Path(inspect.getfile(take)))
 
 
 def _kept(path: Path, key: str) -> Figures | None:

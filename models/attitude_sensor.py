@@ -63,7 +63,7 @@ from .sensors.digital_filter import TAPS, DelayLines
 from .sensors.exchange import Answering, Exchange, Received
 from .sensors.faults import LOST_FRAMES, FaultParameters, is_active
 from .sensors.gyro import GYRO_FILTER, GyroCoefficients, GyroParameters, GyroState
-from .sensors.sensitivity import hysteresis_loop, hysteresis_offset, with_temperature
+from .sensors.sensitivity import hysteresis_loop, hysteresis_offset, straightened, with_temperature
 from .sensors.thermal import (
     HeaterParameters,
     HeaterState,
@@ -144,9 +144,9 @@ class SupplyParameters(NamedTuple):
 
 
 class CompensationParameters(NamedTuple):
-    """What the processor takes out of the readings, with the parts' own thermometers: M diag(s)^-1 (y - b - G f).
+    """What the processor takes out of the readings, with the parts' own thermometers: M diag(s)^-1 v.
 
-    b = b0 + b1 (T - 25 degC) + b2 (T - 25 degC)^2,  s = 1 + k (T - 25 degC).
+    v + c v^3 = y - b - G f,  b = b0 + b1 (T - 25 degC) + b2 (T - 25 degC)^2,  s = 1 + k (T - 25 degC).
     """
 
     gyro_bias: Annotated[Vector3, Real("rad/s", "gyro bias taken out", display="deg/s")] = ZERO3
@@ -155,6 +155,7 @@ class CompensationParameters(NamedTuple):
     gyro_scale_temperature_slope: Annotated[
         Vector3, Real("1/K", "relative change of the gyros' sensitivity with temperature", min=-1e-3, max=1e-3)
     ] = ZERO3
+    gyro_cubic: Annotated[Vector3, Real("s2/rad2", "what bends the gyros' line by its cube", min=-1.0, max=1.0)] = ZERO3
     gyro_matrix: Annotated[Matrix3, Real("1", "what the gyro readings are multiplied by")] = IDENTITY3
     g_sensitivity: Annotated[Matrix3, Real("rad.s/m", "gyro reading by specific force taken out")] = _NOTHING
     accelerometer_bias: Annotated[Vector3, Real("m/s2", "accelerometer bias taken out")] = ZERO3
@@ -166,6 +167,9 @@ class CompensationParameters(NamedTuple):
     ] = ZERO3
     accelerometer_scale_temperature_slope: Annotated[
         Vector3, Real("1/K", "relative change of the accelerometer's sensitivity with temperature", min=-1e-3, max=1e-3)
+    ] = ZERO3
+    accelerometer_cubic: Annotated[
+        Vector3, Real("s4/m2", "what bends the accelerometer's line by its cube", min=-1e-3, max=1e-3)
     ] = ZERO3
     accelerometer_matrix: Annotated[Matrix3, Real("1", "what the accelerometer readings are multiplied by")] = IDENTITY3
 
@@ -677,12 +681,13 @@ def _compensated(rate: Vector3, force: Vector3, slow: SlowState, p: Parameters) 
         slope, curve = c.gyro_bias_temperature_slope[i], c.gyro_bias_temperature_curve[i]
         return with_temperature(c.gyro_bias[i], slope, curve, gyro_temperature)
 
-    unbiased = _at_reference_scale(
-        subtract(force, each_axis(part_bias)), c.accelerometer_scale_temperature_slope, part_temperature
-    )
-    true_force = multiply(c.accelerometer_matrix, unbiased)
+    unbiased = subtract(force, each_axis(part_bias))
+    straight = each_axis(lambda i: straightened(unbiased[i], c.accelerometer_cubic[i]))
+    scaled = _at_reference_scale(straight, c.accelerometer_scale_temperature_slope, part_temperature)
+    true_force = multiply(c.accelerometer_matrix, scaled)
     unmoved = subtract(subtract(rate, each_axis(gyro_bias)), multiply(c.g_sensitivity, true_force))
-    true_rate = multiply(c.gyro_matrix, _at_reference_scale(unmoved, c.gyro_scale_temperature_slope, gyro_temperature))
+    turning = each_axis(lambda i: straightened(unmoved[i], c.gyro_cubic[i]))
+    true_rate = multiply(c.gyro_matrix, _at_reference_scale(turning, c.gyro_scale_temperature_slope, gyro_temperature))
     return _Read(true_rate, true_force)
 
 

@@ -50,6 +50,9 @@ and the ranges that every part has."""
 NEVER_WILD = ("attitude.q_nb", "attitude.fusion.covariance")
 """What no run can bring to zero or to a hundred times itself."""
 
+LEAST = {"solver_period": 1e-4}
+"""Steps shorter than these make random runs last."""
+
 
 def near(leaf: Leaf, value: float, chance: random.Random) -> float:
     """A random legal value near `value`."""
@@ -90,8 +93,11 @@ def bits(values: list[float]) -> list[str]:
     return [float(value).hex() for value in values]
 
 
-def reconciled(model: Model, parameters: list[float]) -> list[float]:
-    """The parameters, those that a rule refuses back at their start values or as near to them as the rule lets them."""
+def reconciled(model: Model, parameters: list[float]) -> list[float] | None:
+    """Parameters that go together: those that a rule refuses back at their start values, or as near as the rule lets.
+
+    None where that is not enough, or where a run would take very many steps.
+    """
     found = list(parameters)
     places = {leaf.name: (place, leaf.start) for place, leaf in enumerate(leaves(model.Parameters))}
     for rule in model.rules:
@@ -99,6 +105,13 @@ def reconciled(model: Model, parameters: list[float]) -> list[float]:
         place, start = places[rule.field]
         if not low <= found[place] <= high:
             found[place] = type(start)(min(max(start, low), high))
+        if found[place] < LEAST.get(rule.field, found[place]):
+            return None
+    try:
+        check(model.Parameters, found, model.name)
+        check_rules(model, unflatten(model.Parameters, found), model.name)
+    except ValueRefusedError:
+        return None
     return found
 
 
@@ -106,9 +119,5 @@ def legal_parameters(model: Model, chance: random.Random) -> list[float]:
     """Random parameters that go together."""
     while True:
         parameters = reconciled(model, points_near(model.Parameters, defaults(model.Parameters), chance))
-        try:
-            check(model.Parameters, parameters, model.name)
-            check_rules(model, unflatten(model.Parameters, parameters), model.name)
-        except ValueRefusedError:
-            continue
-        return parameters
+        if parameters is not None:
+            return parameters

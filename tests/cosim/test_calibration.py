@@ -15,8 +15,8 @@ G = 9.8
 DIRECTIONS = np.array([d for d in itertools.product((0.0, 1.0, -1.0), repeat=3) if any(d)])
 UP = G * DIRECTIONS / np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 FACES = np.flatnonzero(np.sum(np.abs(DIRECTIONS), axis=1) == 1.0)
-TURN = 1.0
-"""rad/s"""
+TURN = np.where(np.sum(UP[FACES], axis=1) > 0.0, 1.0, 1.0 / 3.0)[:, None]
+"""rad/s: fast with an axis up, slow with it down"""
 
 
 def errors_of(seed: int) -> ErrorModel:
@@ -25,6 +25,7 @@ def errors_of(seed: int) -> ErrorModel:
     return ErrorModel(
         np.eye(3) + 0.03 * random.standard_normal((3, 3)),
         1e-4 * random.standard_normal(3),
+        0.02 * random.standard_normal(3),
         0.2 * random.standard_normal(3),
         1e-3 * random.standard_normal(3),
         1e-5 * random.standard_normal(3),
@@ -47,10 +48,12 @@ def read_by(
     duration = np.concatenate((np.full(len(positions), 9.0), np.full(2 * len(FACES), 4.0)))
     parts = []
     for power_up, d in enumerate(temperatures):
-        scaled = (1.0 + truth.scale_temperature_slope * d) * (rate @ truth.sensitivity.T)
+        v = (1.0 + truth.scale_temperature_slope * d) * (rate @ truth.sensitivity.T)
         bias = truth.bias + truth.bias_temperature_slope * d + truth.bias_temperature_curve * d**2
         left = noise / np.sqrt(duration)[:, None] * random.standard_normal(rate.shape)
-        read = scaled + bias + force @ truth.g_sensitivity.T + left + scatter * random.standard_normal(3)
+        read = (
+            v + truth.cubic * v**3 + bias + force @ truth.g_sensitivity.T + left + scatter * random.standard_normal(3)
+        )
         n = len(rate)
         parts.append(Readings(rate, read, force, np.full(n, d), duration, np.full(n, power_up)))
     return Readings._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
@@ -134,7 +137,7 @@ def test_compensation_takes_out_what_was_found() -> None:
     for prefix, model in read.items():
         matrix = np.array([[values[f"{prefix}_matrix[{i},{j}]"] for j in (1, 2, 3)] for i in (1, 2, 3)])
         assert matrix @ model.sensitivity == pytest.approx(np.eye(3), abs=1e-12)
-        for name in ("bias", "bias_temperature_slope", "bias_temperature_curve", "scale_temperature_slope"):
+        for name in ("bias", "bias_temperature_slope", "bias_temperature_curve", "scale_temperature_slope", "cubic"):
             assert [values[f"{prefix}_{name}[{i}]"] for i in (1, 2, 3)] == list(getattr(model, name))
     assert values["compensation.g_sensitivity[2,3]"] == gyro.g_sensitivity[1, 2]
-    assert len(values) == 9 + 9 + 9 + 8 * 3
+    assert len(values) == 9 + 9 + 9 + 10 * 3

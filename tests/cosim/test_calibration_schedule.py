@@ -49,7 +49,7 @@ def up_along(angle: Axes) -> np.ndarray:
 
 
 def test_positions_are_spread_evenly_over_all_directions() -> None:
-    rows = [row for row in calibration_profile(20.0).rows if row.kind == "move"]
+    rows = [row for row in calibration_profile(20.0, 10.0).rows if row.kind == "move"]
     up = np.array([up_along(row.angle) for row in rows])
     assert len(np.unique(np.round(up, 9), axis=0)) == 26
     # as for the whole sphere: no direction prefers, none leans to another
@@ -61,7 +61,7 @@ def test_positions_are_spread_evenly_over_all_directions() -> None:
 
 
 def test_turns_go_once_round_each_way_about_every_axis() -> None:
-    rows = calibration_profile(20.0).rows
+    rows = calibration_profile(20.0, 10.0).rows
     assert len(rows) <= ROWS
     seen = []
     for before, row in itertools.pairwise(rows):
@@ -81,8 +81,8 @@ def test_verification_is_where_the_calibration_was_not(schedule: Schedule) -> No
     assert (min(schedule.verified), max(schedule.verified)) == (0.0, 60.0)
     assert min(schedule.calibrated) < 0.0
     assert max(schedule.calibrated) > 60.0
-    positions = [up_along(row.angle) for row in calibration_profile(20.0).rows if row.kind == "move"]
-    verified = verification_profile(20.0).rows
+    positions = [up_along(row.angle) for row in calibration_profile(20.0, 10.0).rows if row.kind == "move"]
+    verified = verification_profile(20.0, 5.0).rows
     assert {round(math.degrees(max(row.angle, key=abs))) for row in verified} >= {-40, 40}
     for row in verified:
         # more than 4 deg from every position of the calibration

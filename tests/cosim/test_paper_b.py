@@ -4,68 +4,55 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from attitude_fmu.cosim import paper_b, paper_b_causes, paper_b_noise, paper_b_static, paper_b_turns
-from attitude_fmu.cosim.experiment import Case, Cases, Experiment, findings
+from attitude_fmu.cosim.experiment import Case, Cases, Experiment, by_case, findings, trials_of
 from attitude_fmu.cosim.identification import Ar1Fit, fit_ar1
 from attitude_fmu.cosim.master import simulate
 from attitude_fmu.cosim.monte_carlo import run_trials
 from attitude_fmu.cosim.paper_b_bench import (
     ANGLES,
-    BESIDE,
     FILTERED,
     FORCE_NOISE,
     RATE,
     RATE_NOISE,
-    START,
     bench,
-    beside,
 )
 from attitude_fmu.cosim.paper_b_noise import filtered, independent, lag_of, low_passed
-from attitude_fmu.cosim.profiles import PAPER_B_PITCH_TURNS, Profile, move
+from attitude_fmu.cosim.profiles import (
+    PAPER_B_PITCH,
+    PAPER_B_PITCH_TURNS,
+    PAPER_B_ROLL,
+    PAPER_B_ROLL_TURNS,
+    Profile,
+    move,
+)
 from attitude_fmu.cosim.reproduce import draw
 from attitude_fmu.cosim.system import check
-from attitude_fmu.fmu_src.build import build_all
 from attitude_fmu.models.plants.turntable_profile import NO_AXES
 from attitude_fmu.models.sensors.devices import parameters
 
-SEEDS = 2
+SEEDS = {"paper-b-noise": 1, "paper-b-static": 1, "paper-b-turns": 2, "paper-b-causes": 2}
 EXPERIMENTS = {one.name: one for one in paper_b.EXPERIMENTS}
 REST = Profile("rest", (move("level", NO_AXES, 60.0),))
-
-
-@pytest.fixture(scope="session")
-def bench_dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the two FMUs of the bench."""
-    folder = tmp_path_factory.mktemp("bench")
-    build_all(folder, ["Turntable", "AttitudeSensor"])
-    return folder
 
 
 @pytest.fixture(scope="session")
 def records(bench_dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Cases]:
     """The first seeds of every case of every experiment."""
 
-    def some(one: Experiment) -> list[Case]:
-        return [case._replace(seeds=SEEDS) for case in one.cases(bench_dist)]
+    def some(one: Experiment, dist: Path) -> tuple[Case, ...]:
+        return tuple(case._replace(seeds=SEEDS[one.name]) for case in one.cases(dist))
 
-    trials = [
-        case.trial(seed)._replace(name=f"{one.name}/{case.name}/{seed}")
-        for one in paper_b.EXPERIMENTS
-        for case in some(one)
-        for seed in range(1, SEEDS + 1)
-    ]
+    few = [one._replace(cases=partial(some, one)) for one in paper_b.EXPERIMENTS]
+    trials = [trial for one in few for trial in trials_of(one, bench_dist)]
     found = run_trials(trials, tmp_path_factory.mktemp("records"))
-    return {
-        one.name: {
-            case.name: [found[f"{one.name}/{case.name}/{seed}"] for seed in range(1, SEEDS + 1)] for case in some(one)
-        }
-        for one in paper_b.EXPERIMENTS
-    }
+    return {one.name: by_case(one, found) for one in few}
 
 
 # --- what is printed -------------------------------------------------------------------------------------------------
@@ -92,12 +79,24 @@ def test_a_steady_drift_is_all_on_its_line() -> None:
 # --- the bench -------------------------------------------------------------------------------------------------------
 
 
-def test_the_other_axis_stays_at_20_deg_and_the_null_has_its_time() -> None:
-    rows = beside(PAPER_B_PITCH_TURNS, "inner").rows
-    assert {row.angle.inner for row in rows} == {math.radians(BESIDE)}
-    assert [round(math.degrees(row.angle.middle)) for row in rows] == list(ANGLES)
+@pytest.mark.parametrize(
+    ("profile", "turned", "other"),
+    [
+        (PAPER_B_PITCH, "middle", "inner"),
+        (PAPER_B_ROLL, "inner", "middle"),
+        (PAPER_B_PITCH_TURNS, "middle", "inner"),
+        (PAPER_B_ROLL_TURNS, "inner", "middle"),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_the_other_axis_stays_at_20_deg_and_the_null_has_its_time(profile: Profile, turned: str, other: str) -> None:
+    first, *rows = profile.rows
+    assert {round(math.degrees(getattr(row.angle, other)), 9) for row in profile.rows} == {20.0}
+    angles = [round(math.degrees(getattr(row.angle, turned))) for row in rows]
+    assert angles == list(ANGLES)[-len(angles) :]
+    assert getattr(first.angle, turned) == 0.0
     # 30 s of a clock that is 3 % slow, 2 s of levelling, and what errors are counted from
-    assert rows[0].duration == START > 30.0 / 0.97 + 2.0 + paper_b_turns.LEVEL
+    assert first.duration > 30.0 / 0.97 + 2.0 + paper_b_turns.LEVEL
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
@@ -127,35 +126,50 @@ def test_every_claim_is_found_and_drawn(name: str, records: Mapping[str, Cases],
 def test_a_calibrated_piece_keeps_the_limit_at_rest_and_shows_the_mounting(
     angle: str, records: Mapping[str, Cases]
 ) -> None:
-    for one in records["paper-b-static"][f"{angle}-ours"]:
+    for one in records["paper-b-static"][f"{angle}-tuned"]:
         assert float(one["largest_error"]) < 0.05
         assert float(one["offset"]) == pytest.approx(paper_b_static.OFFSET[angle], abs=0.1)
+
+
+def test_fused_turns_stay_below_the_goal(records: Mapping[str, Cases]) -> None:
+    runs = [one for angle in ("pitch", "roll") for one in records["paper-b-turns"][f"{angle}-tuned"]]
+    largest = sorted(float(one["largest_error"]) for one in runs)
+    # one run in twenty exceeds it: two of four do so but once in seventy
+    assert largest[-2] < paper_b_turns.GOAL
+    # 0.024 deg rms over all runs; a run has some 80 independent samples and an offset of its own of 0.009 deg
+    assert math.sqrt(np.mean([float(one["rms_error"]) ** 2 for one in runs])) < 0.03
 
 
 @pytest.mark.parametrize("angle", ["pitch", "roll"])
 def test_fused_turns_stay_ten_times_closer_than_the_gyros(angle: str, records: Mapping[str, Cases]) -> None:
     cases = records["paper-b-turns"]
-    # 0.024 deg rms of 2000 samples: five standard deviations
-    assert all(float(one["largest_error"]) < 0.13 for one in cases[f"{angle}-ours"])
     ours, theirs = [
-        math.sqrt(sum(float(one["error_40"]) ** 2 for one in cases[name])) for name in (f"{angle}-ours", angle)
+        math.sqrt(sum(float(one["error_40"]) ** 2 for one in cases[name])) for name in (f"{angle}-tuned", angle)
     ]
     assert ours < 0.1 * theirs
 
 
-def test_the_gyros_error_grows_with_the_turn(records: Mapping[str, Cases]) -> None:
-    cases = records["paper-b-turns"]
-    several = [*cases["pitch"], *cases["roll"]]
-    early, late = [math.sqrt(np.mean([float(one[name]) ** 2 for one in several])) for name in ("error_10", "error_40")]
-    assert early < late
-    # 1.2 deg rms expected; the rms of four runs lies within 0.15 and 2.2 times that but for one in five hundred
-    assert 0.15 * 1.2 < late < 2.2 * 1.2
+@pytest.mark.parametrize("angle", ["pitch", "roll"])
+def test_a_residual_bias_grows_as_the_printed_errors_do(angle: str, bench_dist: Path) -> None:
+    case = {one.name: one for one in EXPERIMENTS["paper-b-turns"].cases(bench_dist)}[f"{angle}-residual"].trial(1)
+    # without noise the part's own steps of 0.07 deg/s would round a rate of 1 deg/s
+    quiet = {"noise_density": 0.0, "nonlinearity": 0.0, "resolution": 1e-6, "code_limit": 2**31 - 1}
+    one = case._replace(system=case.system.with_values("quiet", {f"sensor.gyro.{k}": v for k, v in quiet.items()}))
+    outcome = simulate(
+        one.system, stop_time=one.stop_time, step=one.step, order=one.order, record=one.record, interval=one.interval
+    )
+    errors = np.array([one.take(outcome.results)[f"error_{at}"] for at in paper_b_turns.TURNED])
+    growth = np.diff(errors) / 10.0
+    # 0.1 s of each turn is a rest, 0.1 s the table's settling
+    np.testing.assert_allclose(growth, paper_b_turns.RESIDUAL, rtol=0.03)
+    for printed in paper_b_turns.PRINTED.values():
+        assert np.polyfit(paper_b_turns.TURNED, printed, 1)[0] == pytest.approx(np.mean(growth), rel=0.04)
 
 
 # --- causes 3 and 4 --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("index", range(SEEDS))
+@pytest.mark.parametrize("index", range(SEEDS["paper-b-causes"]))
 def test_words_taken_for_the_nominal_time_are_wrong_by_the_clock(index: int, records: Mapping[str, Cases]) -> None:
     cases, own = records["paper-b-causes"], paper_b_causes.clock_error(index + 1)
     flag, timer, measured = [cases[name][index] for name in ("flag", "timer", "measured")]

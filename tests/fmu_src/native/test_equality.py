@@ -101,9 +101,9 @@ def _parameters(model: Model, case: int, chance: random.Random) -> Values:
             choice = _choice(leaf, case, place)
             centre = centres.get(leaf.name, leaf.start)
             found[leaf.name] = settable_near(leaf, centre, chance) if choice is None else choice
-        found = dict(zip(found, reconciled(model, list(found.values())), strict=True))
-        if _runs(model, found):
-            return found
+        together = reconciled(model, list(found.values()))
+        if together is not None and _runs(model, dict(zip(found, together, strict=True))):
+            return dict(zip(found, together, strict=True))
 
 
 def _tuned(model: Model, parameters: Values, chance: random.Random) -> Values:

@@ -195,6 +195,28 @@ def test_compensation_takes_out_exactly_what_it_is_given(device: str) -> None:
     assert shown.specific_force_measured == pytest.approx(force, abs=5e-7)
 
 
+@pytest.mark.parametrize("part", ["gyro", "accelerometer"])
+def test_compensation_straightens_a_bent_line(part: str) -> None:
+    """Of (1 - c1) v + c3 v^3 the cubic is c3/(1 - c1)^3, and the matrix takes 1 - c1 out."""
+    p = faultless(fine=True, **{f"{part}__nonlinearity": 0.01})
+    linear, cubic = getattr(MODEL.coefficients(p), part).cubic[:2]
+    c, m = cubic / (1.0 - linear) ** 3, 1.0 / (1.0 - linear)
+    given = {
+        f"compensation__{part}_cubic": (c, c, c),
+        f"compensation__{part}_matrix": ((m, 0.0, 0.0), (0.0, m, 0.0), (0.0, 0.0, m)),
+    }
+    rate, force = (0.5, -1.0, 2.0), (3.0, 6.0, -9.0)
+    moving = STILL._replace(rate=rate, specific_force=force)
+    read, true = ("rate_measured", rate) if part == "gyro" else ("specific_force_measured", force)
+    raw = getattr(run_of(p, moving, 0.05).outputs(), read)
+    assert np.min(np.abs(np.array(raw) - true) / np.abs(true)) > 0.01
+    straight = faultless(fine=True, **{f"{part}__nonlinearity": 0.01}, **given)
+    shown = np.array(getattr(run_of(straight, moving, 0.05).outputs(), read))
+    # a Newton step leaves 3 (c y^2)^3 of a reading
+    left = 3.0 * (c * np.square(true)) ** 3
+    assert np.all(np.abs(shown - true) < (1.5 * left + 1e-8) * np.abs(true))
+
+
 def test_compensation_is_only_as_good_as_the_thermometer() -> None:
     p = faultless(
         fine=True,
