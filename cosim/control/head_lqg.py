@@ -85,8 +85,5 @@ def _plant(head: Head, friction: Array, corner: Array) -> Plant:
     joint[:, :n], line[:, :n] = P.C[JOINT], P.C[LINE]
     C = np.vstack([np.hstack([np.zeros((6, n + 3)), S.C]), joint])
     R = np.diag(np.repeat(np.square([_RATE, _FORCE, ENCODER]), 3))
-    return Plant(A, B, C, line, G @ G.T + _TINY * np.eye(len(A)), R)
+    return Plant(A, B, C, line, G @ G.T, R)
 
-
-_TINY = 1e-22
-"""Noise of every state, which keeps the estimator's equation regular."""

@@ -29,7 +29,7 @@ BODY_RATES = ((2, -1.0), (0, 1.0), (1, 1.0))
 """Element and sign of the body's rate that each joint turns, the head level: yaw about -z, pitch x, roll y."""
 
 _WIND = "wind."
-_SPREAD = 1e-2
+_SPREAD = 5e-2
 """Part of the widest gust's variance below which a direction of the wind's states is left at its mean."""
 
 IN_MOTION: Mapping[str, float] = {"solver.fusion.rest_bias": 0.0}
@@ -77,8 +77,8 @@ def plant_model(clocks: Clocks, parameters: Mapping[str, float]) -> PlantModel:
     """The plant, its joints held at zero by constant torques, in the mean wind and in its gusts.
 
     Drag goes with the square of the wind, so that gusts act the more the stronger they are. The models of `gusts` are
-    linear at the sigma points of the wind's own distribution: the mean of their powers is exact for forces that are
-    quadratic in the wind.
+    linear at points that have the mean and covariance of the wind's own distribution: the mean of their powers is exact
+    for forces that are quadratic in the wind.
     """
     values = {**parameters, **clocks.plant}
     point = operating_point(PLANT, clocks.period, values, hold={"joint": 0.0}, free=TORQUE)
@@ -94,14 +94,18 @@ def _plant_noise(point: OperatingPoint, **options: bool) -> ModelNoise:
 
 
 def _sigma_points(noise: ModelNoise, wind: list[int]) -> list[Array]:
-    """Deviations of the wind's states, +-sqrt(r) along each of r principal directions of their covariance."""
+    """Deviations of the wind's states: +-1 standard deviation along each principal direction of their covariance.
+
+    Signs are those of a Hadamard matrix and its negative, so that mean and covariance of the points are exact.
+    """
     if not wind:
         return []
     A, G = noise.system.A[np.ix_(wind, wind)], noise.G[wind]
     values, vectors = np.linalg.eigh(linalg.solve_discrete_lyapunov(A, G @ noise.QN @ G.T))
     wide = values > _SPREAD * values[-1]
-    directions = vectors[:, wide] * np.sqrt(wide.sum() * values[wide])
-    return [sign * direction for direction in directions.T for sign in (1.0, -1.0)]
+    directions = vectors[:, wide] * np.sqrt(values[wide])
+    signs = linalg.hadamard(1 << (int(wide.sum()) - 1).bit_length())[:, : wide.sum()]
+    return list(np.vstack([signs, -signs]) @ directions.T)
 
 
 def _with_wind(point: OperatingPoint, labels: list[str], change: Array) -> OperatingPoint:

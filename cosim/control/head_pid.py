@@ -45,8 +45,8 @@ _ROLL = 0.3
 _THINNED = 3
 """Every third frequency does for comparing designs."""
 
-_INERTIA_AT = 0.08
-"""Of the sampling rate: above the friction and the tripod, below the ball head; where a joint's inertia is read off."""
+_INERTIA_AT = 40.0
+"""Hz; above friction and tripod, below the ball head: where a joint's inertia is read off."""
 
 
 class Pid(NamedTuple):
@@ -125,7 +125,7 @@ def _axis(pid: Pid, sign: float, dt: float) -> control.StateSpace:
 
 def inertias(head: Head) -> Array:
     """What each motor turns, kg.m2: 1/|(2 pi f)^2 angle/torque| well above the friction's stiffness."""
-    k = int(np.searchsorted(head.frequencies, _INERTIA_AT / head.clocks.period))
+    k = int(np.searchsorted(head.frequencies, _INERTIA_AT))
     angle = np.abs(np.diagonal(head.mean.torque[k, JOINT]))
     return np.asarray(1.0 / ((2.0 * np.pi * head.frequencies[k]) ** 2 * angle))
 
@@ -133,7 +133,7 @@ def inertias(head: Head) -> Array:
 def resonances(head: Head) -> Array:
     """Where each joint resonates with the ball head, Hz: the peak of |(2 pi f)^2 angle/torque| above the loop's band."""
     f = head.frequencies
-    above = f > _INERTIA_AT / head.clocks.period
+    above = f > _INERTIA_AT
     angles = np.abs(np.diagonal(head.mean.torque[above, JOINT], axis1=1, axis2=2))
     return np.asarray(f[above][np.argmax(angles * f[above, None] ** 2, axis=0)])
 

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg  # type: ignore[import-untyped]
 
+from ..errors import LinearisationRefusedError
 from .responses import Array
 
-_REGULAR = 1e-18
-"""Weight of every state in the regulator's cost, which keeps the equation regular where the cost sees nothing."""
+_DOUBLINGS = 60
+_CONVERGED = 1e-12
 
 
 class Plant(NamedTuple):
@@ -40,6 +41,39 @@ class Cost(NamedTuple):
     weights: Array
     leak: float
     effort: Array
+
+
+def riccati(A: Array, G: Array, Q: Array) -> Array:
+    """X = A' X (1 + G X)^-1 A + Q, G = B R^-1 B', by doubling.
+
+    Accurate where eigenvalues lie near the unit circle, as those of slow noise do. Source: Chu, Fan, Lin, Wang, "Structure-
+    preserving algorithms for periodic discrete-time algebraic Riccati equations", Int. J. Control 77 (2004) 767.
+
+    Raises `LinearisationRefusedError` where it does not converge: the plant cannot be stabilised, or not be seen.
+    """
+    scale = _sizes(A, G, Q)
+    a, g, h = A * scale / scale[:, None], G / np.outer(scale, scale), Q * np.outer(scale, scale)
+    for _ in range(_DOUBLINGS):
+        lu = linalg.lu_factor(np.eye(len(a)) + g @ h)
+        across, spread = linalg.lu_solve(lu, a), linalg.lu_solve(lu, g)
+        change = a.T @ h @ across
+        a, g, h = a @ across, g + a @ spread @ a.T, h + change
+        g, h = 0.5 * (g + g.T), 0.5 * (h + h.T)
+        if not np.isfinite(h).all():
+            break
+        if np.linalg.norm(change) < _CONVERGED * np.linalg.norm(h):
+            return np.asarray(h / np.outer(scale, scale))
+    raise LinearisationRefusedError(
+        "no stabilising solution: a mode that does not decay is not reached by the torques, or not seen by the readings"
+    )
+
+
+def _sizes(A: Array, G: Array, Q: Array) -> Array:
+    """Scales of the states that make A, G and Q alike in size: powers of two."""
+    n = len(A)
+    whole = np.block([[np.abs(A), np.sqrt(np.abs(np.diag(np.diag(G))))], [np.sqrt(np.diag(np.diag(Q))), np.zeros((n, n))]])
+    _, (scale, _) = linalg.matrix_balance(whole, permute=False, separate=True)
+    return np.asarray(scale[:n])
 
 
 class Observer(NamedTuple):
@@ -69,14 +103,14 @@ def regulator(plant: Plant, cost: Cost, dt: float) -> tuple[Array, Array, Array]
     q = np.diag(cost.weights)
     seen = np.vstack([np.hstack([q @ plant.E, -q]), cost.leak * np.hstack([q @ plant.E, np.zeros((m, m))])])
     R = np.diag(cost.effort**2)
-    X = linalg.solve_discrete_are(A, B, seen.T @ seen + _REGULAR * np.eye(n + m), R)
+    X = riccati(A, B @ np.linalg.solve(R, B.T), seen.T @ seen)
     K = np.linalg.solve(B.T @ X @ B + R, B.T @ X @ A)
     return K, a * np.eye(m), (1.0 - a) * np.eye(m)
 
 
 def estimator(plant: Plant) -> tuple[Array, Array]:
     """M of the corrected estimate xf = xp + M (y - C xp), and the standard deviations of y - C xp."""
-    Y = linalg.solve_discrete_are(plant.A.T, plant.C.T, plant.W, plant.R)
+    Y = riccati(plant.A.T, plant.C.T @ np.linalg.solve(plant.R, plant.C), plant.W)
     spread = plant.C @ Y @ plant.C.T + plant.R
     return np.linalg.solve(spread, plant.C @ Y).T, np.sqrt(np.diag(spread))
 

@@ -18,8 +18,10 @@ Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
 def response(A: Array, B: Array, C: Array, D: Array | float, frequencies: Array, dt: float) -> Complex:
     """H at each frequency (Hz): frequencies x outputs x inputs."""
-    T, U = linalg.schur(np.asarray(A, complex), output="complex")
-    b, c = U.conj().T @ B, C @ U
+    # states of very different size would cost digits
+    balanced, (scale, _) = linalg.matrix_balance(A, permute=False, separate=True)
+    T, U = linalg.schur(balanced, output="complex")
+    b, c = U.conj().T @ (B / scale[:, None]), (C * scale) @ U
     found = np.empty((len(frequencies), c.shape[0], b.shape[1]), complex)
     place = np.diag_indices(len(T))
     shifted = -T

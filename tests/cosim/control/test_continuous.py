@@ -77,7 +77,7 @@ def test_a_pole_is_exact_at_rest_and_in_phase_wherever_it_lies(pole: float) -> N
     for frequency in (0.001, 0.01, 0.05, 0.1):
         x = 2.0 * np.pi * frequency
         found = ratio(system, frequency)
-        assert -x**2 / 24.0 - 1e-6 < abs(found) - 1.0 < 2e-4
+        assert -(x**2) / 24.0 - 1e-6 < abs(found) - 1.0 < 2e-4
         assert np.degrees(np.angle(found)) == pytest.approx(0.0, abs=0.02)
     assert np.squeeze(ratio(system, 1e-7)) == pytest.approx(1.0, abs=1e-6)
 
