@@ -162,8 +162,8 @@ def _delays(A: Array, T: float, order: int) -> _Matrices:
     loop = np.eye(n) - d @ A
     if n and np.linalg.cond(loop) > 1e9:
         raise LinearisationRefusedError(
-            f"a pole at z = -1 has no Pade approximation of order {order}: take an even order, or damp what rings at half "
-            "the sampling rate"
+            f"a pole at z = -1 has no Pade approximation of order {order}: take an even order, or damp what rings at "
+            "half the sampling rate"
         )
     solved = np.linalg.inv(loop)
     return _Matrices(a + b @ A @ solved @ c, b + b @ A @ solved @ d, solved @ c, solved @ d)

@@ -160,7 +160,7 @@ class _Edges:
         )
 
     def _advice(self, inputs: Sequence[int], outputs: Sequence[int], dt: float) -> str:
-        """The sampling time near dt that the slowest odd task fits, and what to set for the rest of the way to fit it."""
+        """The sampling time near dt that the slowest odd task fits, and what to set for the rest to fit it."""
         compiled, way = self.compiled, self.between(inputs, outputs)
         odd = self.odd(inputs, outputs)
         slowest = max(compiled.periods[compiled.tasks[number].clock] * compiled.every[number] for number in odd)
@@ -174,11 +174,10 @@ class _Edges:
         }
         ways = [f"choose dt = {better:.15g} s"]
         for clock, task in misfits.items():
-            ways.append(
-                f"set {listed(compiled.set_by(clock))} so that {task} runs every {better:.15g} s or a whole part"
-            )
-        task = compiled.tasks[odd[0]]
-        return f"{' and '.join(ways)}; or set {listed(compiled.set_by(task.clock))} so that {task.name} fits dt"
+            to_set = listed(compiled.set_by(clock))
+            ways.append(f"set {to_set} so that {task} runs every {better:.15g} s or a whole part")
+        first = compiled.tasks[odd[0]]
+        return f"{' and '.join(ways)}; or set {listed(compiled.set_by(first.clock))} so that {first.name} fits dt"
 
     def pace(self, place: int, outputs: Sequence[int]) -> float:
         """Sampling times that an input's way takes to come round, 1 where everything fits dt."""
@@ -324,8 +323,8 @@ def check_same(found: Linear, B: Array, slim: Slim) -> None:
     error = difference(folded.A, B, folded.C[found.outputs], slim)
     if not error < SAME:
         raise LinearisationRefusedError(
-            f"{found.compiled.model.name}: leaving out idle states changes the frequency response by {error:.2g} of its "
-            f"largest (allowed: {SAME:.2g}); its numbers differ too much in size: choose fewer inputs and outputs"
+            f"{found.compiled.model.name}: leaving out idle states changes the frequency response by {error:.2g} of "
+            f"its largest (allowed: {SAME:.2g}); its numbers differ too much in size: choose fewer inputs and outputs"
         )
 
 

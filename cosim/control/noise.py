@@ -4,8 +4,8 @@
 
 w are the standard normals that the tasks draw in a sampling time and the errors of what rounds (uniform over a step,
 variance 1/12, taken as white and independent of the signal). All noise passes the filters and is held in registers
-before an output shows it, so that it is in the states. What is left to v is nothing; but an estimator that believes so has
-modes that do not decay, since moving averages have zeros on the unit circle and integrators poles on it. So RN is a floor.
+before an output shows it, so that it is in the states. Nothing is left to v; but an estimator that believes so has
+modes that do not decay, as moving averages have zeros on the unit circle and integrators poles. So RN is a floor.
 
 Processes that step more seldom than dt (in-run bias instability, every 0.1 s) are taken at dt with the same
 covariance function at their own steps; their staircase is smoothed.
@@ -43,7 +43,7 @@ _INSIDE = 1.0 - 1e-9
 
 READING_NOISE = 1e-3
 """White noise of a reading as part of the largest deviation that a sampling time's noise makes of it: enough for
-`control.dlqe`, and less than 2 % worse for a measured rate; assumption."""
+`control.dlqe`, and 0.003 % worse for a measured rate; assumption."""
 
 _MATCH = 1e-9
 """Part by which a state may miss being a sum of others."""
@@ -121,9 +121,9 @@ def model_noise(
     """x[k+1] = A x[k] + B u[k] + G w[k], y[k] = C x[k]: `model_ss` with the states that shape the noise.
 
     G, QN and RN are what `control.dlqe` and `control.create_estimator_iosystem` take. Arguments and errors are those of
-    `model_ss`; noise that steps every few dt and is no sum of Markov processes is refused too. `reading_noise` makes RN:
-    the deviation of a white noise on each output, as a part of the largest that the noise of one sampling time makes of
-    it. Design needs outputs that are independent of each other: euler, or the quaternion, not both.
+    `model_ss`; noise that steps every few dt and is no sum of Markov processes is refused too. `reading_noise` makes
+    RN: the deviation of a white noise on each output, as a part of the largest that the noise of one sampling time
+    makes of it. Design needs outputs that are independent of each other: euler, or the quaternion, not both.
 
     >>> import control
     >>> noise = model_noise("AttitudeSensor_ADXRS450_ADXL355", 0.002, inputs="rate", outputs="rate_measured")
@@ -229,8 +229,8 @@ def _refusal(compiled: Compiled, number: int, why: str) -> LinearisationRefusedE
     task = compiled.tasks[number]
     period = compiled.periods[task.clock] * compiled.every[number]
     return LinearisationRefusedError(
-        f"{compiled.model.name}: the task {task.name} steps every {period:.6g} s, not every dt, and {why}: choose dt so, "
-        f"or set {listed(compiled.set_by(task.clock))}, or leave out the outputs that show it"
+        f"{compiled.model.name}: the task {task.name} steps every {period:.6g} s, not every dt, and {why}: choose "
+        f"dt so, or set {listed(compiled.set_by(task.clock))}, or leave out the outputs that show it"
     )
 
 

@@ -120,7 +120,7 @@ class ChainOutputs(NamedTuple):
 def chained(samples: int) -> Model:
     """A delay line of so many samples, every second, and coloured noise that a slower clock hands on."""
     line = tuple[(Annotated[float, Real("1", "on its way")],) * samples]  # type: ignore[misc]
-    chain_state = NamedTuple(
+    chain_state = NamedTuple(  # noqa: UP014, the length is known here only
         "ChainState",
         [
             ("line", line),
