@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _SIDES: tuple[tuple[Case, str], ...] = (("before", "Before"), ("after", "After"))
+_LINE = 120
+"""Characters that the picture is wide."""
+
 _TILTS = (("pitch", RC), ("roll", OURS))
 _GYROS = (("x", RC), ("y", KALMAN), ("z", SLOW))
 
@@ -36,7 +40,7 @@ def plot_calibration(path: Path, title: str, residuals: Mapping[Case, Residual],
 
     with mpl.rc_context(STYLE), whole_or_not(path) as draft:
         figure = Figure(figsize=(10.0, 9.0), layout="constrained")
-        figure.suptitle(f"{title}\n{verdict}", ha="left", x=0.01, fontsize=9.5)
+        figure.suptitle(fill(title, _LINE) + "\n" + fill(verdict, _LINE), ha="left", x=0.01, fontsize=9.5)
         panels = figure.subplots(3, 2)
         for column, (case, label) in enumerate(_SIDES):
             one = residuals[case]

@@ -198,9 +198,13 @@ def residual_table(residuals: Mapping[Case, Residual], title: str) -> Table:
     for quantity in _QUANTITIES:
         for what, figure in (("rms", rms), ("largest", _largest)):
             before, after, repeats = (figure(getattr(residuals[case], quantity.field)) for case in residuals)
-            row = (f"{before:.4f}", f"{after:.4f}", f"{before / after:.3g} x", f"{repeats:.4f}", quantity.unit)
+            row = (f"{before:.4f}", f"{after:.4f}", f"{_times(before / after)} x", f"{repeats:.4f}", quantity.unit)
             table.add_row(f"{quantity.name}, {what}", *row)
     return table
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.0f}" if factor > 99.5 else f"{factor:.2g}"
 
 
 def _largest(errors: Array) -> float:
@@ -214,7 +218,7 @@ def verdict(residuals: Mapping[Case, Residual]) -> str:
     reached = "reaches" if factor >= FACTOR and largest < LARGEST else "misses"
     celsius = residuals["after"].temperature
     return (
-        f"static error over ±40 deg and {celsius[0]:g} to {celsius[-1]:g} degC: {factor:.3g} times smaller, "
+        f"static error over ±40 deg and {celsius[0]:g} to {celsius[-1]:g} degC: {_times(factor)} times smaller, "
         f"{rms(after):.4f} deg rms, {largest:.4f} deg at most "
         f"({reached} the goal of {FACTOR:g} times and {LARGEST:g} deg)"
     )

@@ -203,7 +203,7 @@ _ROWS = (
     ("kalman", "Kalman, Q = 0.018, R = 1.84 deg²", KALMAN),
     ("rc-100", "RC, num = 100", RC),
     ("rc-1000", "RC, num = 1000", SLOW),
-    ("tuned", "Ours: fused, tuned (red) and by default (green)", OURS),
+    ("tuned", "Ours, tuned (red) and default (green)", OURS),
 )
 _LABELS = (
     ("raw", "raw", RAW),

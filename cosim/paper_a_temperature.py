@@ -18,7 +18,7 @@ from ..models.plants.turntable_profile import NO_AXES, Axes
 from ..models.scalar import PI
 from ..models.sensors.thermal import HeaterParameters
 from .angle_figures import INK, KALMAN, OURS, RC, SLOW, error_degrees, rms
-from .experiment import BAND, Case, Cases, Claim, Experiment
+from .experiment import Case, Cases, Claim, Experiment
 from .interface import Value
 from .known_errors import known_compensation
 from .monte_carlo import Trial
@@ -139,7 +139,7 @@ def draw(figure: Figure, cases: Cases) -> None:
     upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.8, 1.0))[:, 0]
     _temperatures(upper.subplots(), cases)
     angle, drift = lower.subplots(1, 2)
-    _rests(angle, "Error of the inner angle, 5 to 95 % of the pieces (deg)", "angles", cases)
+    _rests(angle, "Error of the inner angle, least to largest of the pieces (deg)", "angles", cases)
     _rests(drift, "Error of the rates, rms of the gyros (deg/s)", "drifts", cases)
     drift.set_ylim(bottom=0.0)
     figure.legend(*angle.get_legend_handles_labels(), loc="outside lower center", ncols=len(_NAMES))
@@ -160,7 +160,7 @@ def _rests(axes: Panel, title: str, name: str, cases: Cases) -> None:
     axes.set_title(title)
     places = np.arange(len(PROFILE.rows), dtype=float)
     for number, (case, label, colour) in enumerate(_NAMES):
-        low, middle, high = np.percentile([figures[name] for figures in cases[case]], BAND, axis=0)
+        low, middle, high = np.percentile([figures[name] for figures in cases[case]], (0.0, 50.0, 100.0), axis=0)
         spread = (middle - low, high - middle)
         axes.errorbar(
             places + 0.16 * (number - 1.5), middle, spread, fmt="o", ms=4, capsize=2, color=colour, label=label

@@ -212,7 +212,7 @@ def draw(figure: Figure, cases: Cases) -> None:
         _limits(beside_it, GOAL, 0.16)
         largest = np.percentile([one["largest_error"] for one in cases[f"{angle}-tuned"]], (50.0, 95.0, 100.0))
         said = "median {:.3f}, 95 % {:.3f}, most {:.3f}".format(*largest)
-        note(beside_it, f"a piece's largest: {said}; dashed: ±0.1")
+        note(beside_it, f"largest: {said}")
         note(axes, "dashed: ±1 deg")
     for axes in panels[1]:
         axes.set_xlabel("turned at 1 deg/s (deg)")

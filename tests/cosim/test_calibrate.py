@@ -80,7 +80,7 @@ def test_the_static_error_falls_tenfold_and_below_a_twentieth_of_a_degree(done: 
 def test_the_whole_schedule_leaves_what_the_part_itself_wanders(
     device: str, largest: float, bench_dist: Path, tmp_path: Path
 ) -> None:
-    """The table leaves 0.002 deg rms of an ADXL355, flicker and registers 0.015 deg of an ADIS16354; five times."""
+    """0.002 deg rms of an ADXL355 (the table), 0.015 deg of an ADIS16354 (flicker, registers); bounds: five times."""
     found = calibrate("--device", device, "--specimen", "1", "--out", str(tmp_path), "--dist", str(bench_dist))
     assert found.exit_code == 0, found.stderr
     errors = tilt_errors(tmp_path)
