@@ -42,7 +42,7 @@ TURN = 40.0
 """deg, of pitch, at 1 deg/s."""
 
 _DEG = PI / 180.0
-_WORDS = 4
+_WORDS = 6
 """Words that a reading takes, and that are counted: three gyros and the accelerometer."""
 
 
