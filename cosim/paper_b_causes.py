@@ -43,7 +43,7 @@ TURN = 40.0
 
 _DEG = PI / 180.0
 _WORDS = 6
-"""Words that a reading takes, and that are counted: three gyros and the accelerometer."""
+"""Words that are counted at a reading: those of three gyros and three accelerometer channels."""
 
 
 def _profile(name: str, rest: float) -> Profile:
