@@ -45,6 +45,9 @@ READING_NOISE = 1e-3
 """White noise of a reading as part of the largest deviation that a sampling time's noise makes of it: enough for
 `control.dlqe`, and 0.003 % worse for a measured rate; assumption."""
 
+_UNREST = 256
+"""Sampling times, a power of two: half a second at 500 Hz."""
+
 _MATCH = 1e-9
 """Part by which a state may miss being a sum of others."""
 
@@ -75,6 +78,32 @@ class ModelNoise(NamedTuple):
             states=s.state_labels,
             remove_useless_states=False,
         )
+
+    def scaled(self) -> ModelNoise:
+        """The same with the states x/s, s powers of two near the deviations that noise from rest gives them.
+
+        Riccati equations, as `control.dlqe` solves them, lose fewer digits with states of like size. Noise of
+        `_UNREST` sampling times counts; the gain and covariance of x are s L and s P s.
+        """
+        s = self.system
+        A, P = s.A, self.G @ self.QN @ self.G.T
+        for _ in range(_UNREST.bit_length() - 1):
+            A, P = A @ A, P + A @ P @ A.T
+        deviation = np.sqrt(np.diag(P))
+        size = np.exp2(np.round(np.log2(np.where(deviation > 0.0, deviation, 1.0))))
+        system = control.ss(
+            s.A * size / size[:, None],
+            s.B / size[:, None],
+            s.C * size,
+            s.D,
+            s.dt,
+            name=s.name,
+            inputs=s.input_labels,
+            outputs=s.output_labels,
+            states=s.state_labels,
+            remove_useless_states=False,
+        )
+        return self._replace(system=system, G=self.G / size[:, None])
 
     def covariance(self) -> Any:
         """C P C' with P = A P A' + G QN G': stationary covariance of the outputs, of the states that noise reaches.

@@ -17,7 +17,7 @@ import pytest
 from attitude_fmu.cosim.control import LinearisationRefusedError, OperatingPoint, model_ss, operating_point
 from attitude_fmu.cosim.control.folding import without_sums
 from attitude_fmu.models.record import flatten, leaves, unflatten
-from attitude_fmu.models.sensors import digital_filter, quantiser, thermal
+from attitude_fmu.models.sensors import digital_filter, quantiser, words
 from attitude_fmu.models.system import Run
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -179,7 +179,7 @@ def rounding_passed() -> Iterator[None]:
     with (
         mock.patch.object(quantiser, "round_half_up", lambda x: x),
         mock.patch.object(digital_filter, "round_half_up", lambda x: x),
-        mock.patch.object(thermal, "round_half_up", lambda x: x),
+        mock.patch.object(words, "round_half_up", lambda x: x),
     ):
         yield
 

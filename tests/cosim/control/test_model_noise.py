@@ -177,10 +177,28 @@ def test_kalman_designs_of_python_control_take_the_matrices(predicted: ModelNois
     np.testing.assert_allclose(np.square(late).sum(axis=0).mean(), expected, rtol=4.0 * sqrt(2.0 / late.size))
 
 
+def test_scaled_states_are_the_same_system_and_of_like_size(predicted: ModelNoise) -> None:
+    s, scaled = predicted.system, predicted.scaled()
+    t = scaled.system
+    assert t.state_labels == s.state_labels
+    for frequency in (0.5, 40.0, 200.0):
+        z = np.exp(2j * np.pi * frequency * s.dt)
+        np.testing.assert_allclose(scaled.driven(z), predicted.driven(z), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(scaled.covariance(), predicted.covariance(), rtol=1e-9)
+    P = np.zeros_like(t.A)
+    for _ in range(256):
+        P = t.A @ P @ t.A.T + scaled.G @ scaled.QN @ scaled.G.T
+    reached = np.sqrt(np.diag(P))
+    reached = reached[reached > 0.0]
+    assert reached.size > s.nstates / 2
+    assert reached.min() > 0.7
+    assert reached.max() < 1.5
+
+
 @pytest.mark.parametrize("kind", ["gyro", "levelling", "fused"])
 @pytest.mark.parametrize("outputs", ["rate_measured", "euler"])
 def test_every_solvers_noise_gives_a_stable_estimator(kind: str, outputs: str) -> None:
-    noise = model_noise(SENSOR, 0.002, {"solver.kind": kind}, inputs="rate", outputs=outputs)
+    noise = model_noise(SENSOR, 0.002, {"solver.kind": kind}, inputs="rate", outputs=outputs).scaled()
     s = noise.system
     _, P, poles = control.dlqe(s.A, noise.G, s.C, noise.QN, noise.RN)
     assert max(abs(poles)) < 1.0
