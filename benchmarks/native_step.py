@@ -7,6 +7,7 @@ and, in brackets, the smallest of the rounds.
 
 from __future__ import annotations
 
+import os
 import shutil
 import statistics
 import subprocess
@@ -206,7 +207,9 @@ def main(
     console.print(table)
     if judged.row_count:
         console.print(judged)
-    sys.exit(not kept)
+    sys.stdout.flush()
+    # pythonfmu 0.7 reads freed memory as the process exits, which may abort it
+    os._exit(not kept)
 
 
 if __name__ == "__main__":
