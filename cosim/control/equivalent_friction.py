@@ -17,11 +17,13 @@ from scipy import signal  # type: ignore[import-untyped]
 
 from attitude_fmu.models.plants.friction import LuGre, bristle_after, friction_torque
 
-from .responses import Array
+from .conditioning import Array
 
 _DURATION = 60.0
 _STEP = 1e-3
 _SEGMENT = 8192
+_LOW = 1.0
+"""Hz; below it the density is taken as flat."""
 
 
 class EquivalentFriction(NamedTuple):
@@ -31,6 +33,17 @@ class EquivalentFriction(NamedTuple):
     damping: float
     frequencies: Array
     density: Array
+
+    @property
+    def rms(self) -> float:
+        """Of e, N.m."""
+        return float(np.sqrt(np.trapezoid(self.density, self.frequencies)))
+
+    @property
+    def corner(self) -> float:
+        """Of the first-order low-pass that has e's rms and its density at low frequencies, Hz."""
+        low = self.density[self.frequencies < _LOW].mean()
+        return float(2.0 / np.pi * self.rms**2 / low)
 
     def rest_at(self, frequencies: Array) -> Array:
         """The density of e at other frequencies; what is slower than the analysed record is as at its end."""

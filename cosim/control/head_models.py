@@ -14,11 +14,13 @@ from scipy import linalg  # type: ignore[import-untyped]
 from attitude_fmu.models.record import flatten, leaves, unflatten
 
 from ..errors import LinearisationRefusedError
+from .conditioning import Array
 from .equivalent_friction import EquivalentFriction, equivalent_friction
 from .linear import model_ss
 from .noise import ModelNoise, model_noise
 from .operating_point import OperatingPoint, operating_point
-from .responses import Array, Complex, density, response
+from .responses import Complex, density, response
+from .stepping import CLOCK_TOLERANCE, model_called, parameters_with
 
 AXES = ("yaw", "pitch", "roll")
 PLANT, HOLD = "TripodGimbal", "GimbalController"
@@ -29,6 +31,8 @@ BODY_RATES = ((2, -1.0), (0, 1.0), (1, 1.0))
 """Element and sign of the body's rate that each joint turns, the head level: yaw about -z, pitch x, roll y."""
 
 _WIND = "wind."
+_PLANT_STEP = 1e-3
+
 _SPREAD = 5e-2
 """Part of the widest gust's variance below which a direction of the wind's states is left at its mean."""
 
@@ -56,6 +60,20 @@ class Clocks(NamedTuple):
     def hold(self) -> dict[str, float]:
         """The holding controller's parameters."""
         return {"period": self.period}
+
+
+def clocks_of(sensor: str, parameters: Mapping[str, float | str]) -> Clocks:
+    """Clocks of a head with this sensor: the processor's, or the gyros' words' where the processor's does not fit them.
+
+    The plant steps every 1 ms or a little faster, a whole number of times.
+    """
+    model = model_called(sensor)
+    values = parameters_with(model, parameters)
+    word, period = model.coefficients(values).gyro.word_period[0], values.processor.period
+    words = max(round(period / word), 1)
+    if abs(period / word - words) > CLOCK_TOLERANCE * words:
+        period = word
+    return Clocks(period, period / np.ceil(period / _PLANT_STEP - 1e-9))
 
 
 class PlantModel(NamedTuple):
@@ -184,6 +202,16 @@ class Friction(NamedTuple):
     parameters: dict[str, float]
     equivalents: tuple[EquivalentFriction | None, ...]
 
+    @property
+    def rms(self) -> Array:
+        """Of those torques, N.m."""
+        return np.array([0.0 if one is None else one.rms for one in self.equivalents])
+
+    @property
+    def corner(self) -> Array:
+        """Of first-order low-passes that stand for their spectra, Hz."""
+        return np.array([1.0 if one is None else one.corner for one in self.equivalents])
+
     def rest_at(self, frequencies: Array) -> Array:
         """One-sided densities of the torques (N2.m2/Hz) that the linear friction leaves: frequencies x joints."""
         none = np.zeros(len(frequencies))
@@ -207,8 +235,8 @@ def moving_friction(point: OperatingPoint, frequencies: Array, motion: Array) ->
         one = equivalent_friction(friction, frequencies, motion[:, number], seed=number)
         if not (one.stiffness > 0.0 and one.damping > friction.viscous):
             raise LinearisationRefusedError(
-                f"{PLANT}: the friction of {axis} has no linear equivalent at this motion; choose a wind.speed at which "
-                "the head moves"
+                f"{PLANT}: the friction of {axis} has no linear equivalent at this motion; choose a "
+                "wind.speed at which the head moves"
             )
         parameters |= _as_parameters(f"friction.{axis}", friction, given.damping_ratio, one)
         found.append(one)

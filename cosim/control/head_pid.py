@@ -4,8 +4,8 @@
     u = -J w_c (s + w_d) (s + w_i) / (s (1 + s/w_n)) N q
 
 q is the camera's angle as two sensors tell it: between w_0 and w_b the gyro, whose drift matters below and whose delay
-above; outside the joint's encoder, which does not see the tripod move. N is a notch at the ball head's resonance. A cascade of a rate loop in an angle loop with
-the same gains is the same controller.
+above; outside the joint's encoder, which does not see the tripod move. N is a notch at the ball head's resonance. A
+cascade of a rate loop in an angle loop with the same gains is the same controller.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ import control  # type: ignore[import-untyped]
 import numpy as np
 
 from ..errors import LinearisationRefusedError
+from .conditioning import Array
 from .head_models import AXES, BODY_RATES, JOINT
-from .responses import Array, Complex
+from .responses import Complex
 from .stabilised_head import Controller, Head, controlled, jitter_of_parts, radius, single_loops
 
 READINGS = 9
@@ -131,7 +132,7 @@ def inertias(head: Head) -> Array:
 
 
 def resonances(head: Head) -> Array:
-    """Where each joint resonates with the ball head, Hz: the peak of |(2 pi f)^2 angle/torque| above the loop's band."""
+    """Where each joint resonates with the ball head, Hz: the peak of |(2 pi f)^2 angle/torque| above the loop."""
     f = head.frequencies
     above = f > _INERTIA_AT
     angles = np.abs(np.diagonal(head.mean.torque[above, JOINT], axis1=1, axis2=2))

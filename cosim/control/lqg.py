@@ -14,10 +14,12 @@ import numpy as np
 from scipy import linalg  # type: ignore[import-untyped]
 
 from ..errors import LinearisationRefusedError
-from .responses import Array
+from .conditioning import Array, balancing
 
 _DOUBLINGS = 60
 _CONVERGED = 1e-12
+_NOTHING = 1e-14
+"""Part of the largest Hankel singular value that is rounding."""
 
 
 class Plant(NamedTuple):
@@ -46,12 +48,12 @@ class Cost(NamedTuple):
 def riccati(A: Array, G: Array, Q: Array) -> Array:
     """X = A' X (1 + G X)^-1 A + Q, G = B R^-1 B', by doubling.
 
-    Accurate where eigenvalues lie near the unit circle, as those of slow noise do. Source: Chu, Fan, Lin, Wang, "Structure-
-    preserving algorithms for periodic discrete-time algebraic Riccati equations", Int. J. Control 77 (2004) 767.
+    Accurate where eigenvalues lie near the unit circle, as those of slow noise do. Source: Chu, Fan, Lin, Wang,
+    "Structure-preserving algorithms for periodic discrete-time algebraic Riccati equations", Int. J. Control 77 (2004).
 
     Raises `LinearisationRefusedError` where it does not converge: the plant cannot be stabilised, or not be seen.
     """
-    scale = _sizes(A, G, Q)
+    scale = balancing(A, np.diag(np.sqrt(np.diag(G))), np.diag(np.sqrt(np.diag(Q))))
     a, g, h = A * scale / scale[:, None], G / np.outer(scale, scale), Q * np.outer(scale, scale)
     for _ in range(_DOUBLINGS):
         lu = linalg.lu_factor(np.eye(len(a)) + g @ h)
@@ -66,14 +68,6 @@ def riccati(A: Array, G: Array, Q: Array) -> Array:
     raise LinearisationRefusedError(
         "no stabilising solution: a mode that does not decay is not reached by the torques, or not seen by the readings"
     )
-
-
-def _sizes(A: Array, G: Array, Q: Array) -> Array:
-    """Scales of the states that make A, G and Q alike in size: powers of two."""
-    n = len(A)
-    whole = np.block([[np.abs(A), np.sqrt(np.abs(np.diag(np.diag(G))))], [np.sqrt(np.diag(np.diag(Q))), np.zeros((n, n))]])
-    _, (scale, _) = linalg.matrix_balance(whole, permute=False, separate=True)
-    return np.asarray(scale[:n])
 
 
 class Observer(NamedTuple):
@@ -138,15 +132,27 @@ def truncated(observer: Observer, order: int, readings: Array, efforts: Array) -
     """
     F, Gy, Gu, H, J = observer
     G = np.hstack([Gy * readings, Gu * efforts])
-    reached = _root(linalg.solve_discrete_lyapunov(F, G @ G.T))
-    seen = _root(linalg.solve_discrete_lyapunov(F.T, H.T @ H))
+    size = balancing(F, G, H)
+    f, g, h = F * size / size[:, None], G / size[:, None], H * size
+    reached, seen = gramian_root(f, g), gramian_root(f.T, h.T)
     U, s, V = np.linalg.svd(seen.T @ reached)
-    r = min(order, int(np.sum(s > 1e-13 * s[0])))
-    scale = 1.0 / np.sqrt(s[:r])
-    T, back = reached @ V[:r].T * scale, (seen @ U[:, :r] * scale).T
-    return Observer(back @ F @ T, back @ Gy, back @ Gu, H @ T, J)
+    r = min(order, int(np.sum(s > _NOTHING * s[0])))
+    T, back = reached @ V[:r].T / np.sqrt(s[:r]), (seen @ U[:, :r] / np.sqrt(s[:r])).T
+    return Observer(back @ f @ T, back @ (Gy / size[:, None]), back @ (Gu / size[:, None]), h @ T, J)
 
 
-def _root(P: Array) -> Array:
-    values, vectors = np.linalg.eigh(0.5 * (P + P.T))
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+def gramian_root(A: Array, B: Array) -> Array:
+    """Z with Z Z' = P = A P A' + B B', by doubling; the root itself, so that small directions keep their digits.
+
+    Raises `LinearisationRefusedError` where A is not stable.
+    """
+    Z = B
+    for _ in range(_DOUBLINGS):
+        further = A @ Z
+        Z = np.linalg.qr(np.hstack([Z, further]).T, mode="r").T
+        if not np.isfinite(Z).all():
+            break
+        if np.linalg.norm(further) < _CONVERGED * np.linalg.norm(Z):
+            return np.asarray(Z)
+        A = A @ A
+    raise LinearisationRefusedError("an unstable system has no Gramian")

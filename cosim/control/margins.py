@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize  # type: ignore[import-untyped]
 
-from .responses import Array, Complex
+from .conditioning import Array
+from .responses import Complex
 
 
 class Margins(NamedTuple):

@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 from scipy import linalg  # type: ignore[import-untyped]
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from .conditioning import Array, balancing
+
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
 
 def response(A: Array, B: Array, C: Array, D: Array | float, frequencies: Array, dt: float) -> Complex:
     """H at each frequency (Hz): frequencies x outputs x inputs."""
     # states of very different size would cost digits
-    balanced, (scale, _) = linalg.matrix_balance(A, permute=False, separate=True)
-    T, U = linalg.schur(balanced, output="complex")
+    scale = balancing(A, B, C)
+    T, U = linalg.schur(A * scale / scale[:, None], output="complex")
     b, c = U.conj().T @ (B / scale[:, None]), (C * scale) @ U
     found = np.empty((len(frequencies), c.shape[0], b.shape[1]), complex)
     place = np.diag_indices(len(T))

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..report import EXPOSURE
+from .conditioning import Array
 from .head_models import (
     FORCE,
     JOINT,
@@ -27,7 +28,7 @@ from .head_models import (
     sensor_responses,
 )
 from .margins import Margins, disk_margin, loop_at_a_time, margins, sensitivity
-from .responses import Array, Complex, density, jitter_of, response
+from .responses import Complex, density, jitter_of, response
 
 _SLOWEST = 0.01
 """Hz; slower motion counts for nothing within an exposure of a second."""
