@@ -24,6 +24,7 @@
 `multisine`        signals of many sines, and the spectra of what answers them
 `characteristics`  what a sensor does, measured: noise, responses, calibration, temperature, codes
 `filter_claims`    what the datasheets say of the parts' digital filters
+`sheet_claims`     what the datasheets print as codes and random walks
 `sensor`           a sensor measured as the command does it
 `sensor_findings`  all that is measured of a device
 `sensor_report`    the table of datasheet and modelled part

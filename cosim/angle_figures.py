@@ -20,6 +20,8 @@ TURN = 2.0 * PI
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart
 RAW, KALMAN, RC, SLOW, OURS, INK = "#999999", "#E69F00", "#0072B2", "#56B4E9", "#D55E00", "#333333"
+DEFAULT_COLOUR = "#009E73"
+"""Of our solution as it comes, `OURS` being that of the tuned one."""
 
 
 def degrees(results: Results, name: str) -> Array:
@@ -39,9 +41,14 @@ def within(time: Array, start: float, end: float) -> NDArray[np.bool_]:
 
 
 def settling_time(time: Array, angle: Array, target: float, tolerance: float) -> float:
-    """The first time (s) at which the angle is no further than `tolerance` from `target` (deg); infinite if never."""
-    near = np.flatnonzero(np.abs(angle - target) <= tolerance)
-    return float(time[near[0]]) if len(near) else float("inf")
+    """The first time (s) at which an angle's mean over the second before is within `tolerance` of `target` (deg).
+
+    Infinite if it never is; `time` has equal steps.
+    """
+    size = round(1.0 / float(time[1] - time[0]))
+    mean = np.convolve(angle, np.ones(size) / size, "valid")
+    near = np.flatnonzero(np.abs(mean - target) <= tolerance)
+    return float(time[near[0] + size - 1]) if len(near) else float("inf")
 
 
 def spread(angle: Array, target: float) -> dict[str, float]:
@@ -67,5 +74,4 @@ def rms_over_trials(errors: Any) -> Array:
 
 def note(axes: Axes, text: str, colour: str = INK) -> None:
     """A line of text in the upper right corner of a panel."""
-    place = {"transform": axes.transAxes, "ha": "right", "va": "bottom", "fontsize": 8.5}
-    axes.text(1.0, 1.015, text, color=colour, **place)
+    axes.text(1.0, 1.015, text, color=colour, transform=axes.transAxes, ha="right", va="bottom", fontsize=8.5)

@@ -16,7 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import SystemRefusedError, did_you_mean
+from attitude_fmu.fmu_src.errors import did_you_mean
+
+from .errors import SystemRefusedError
 from .interface import Interface, Value, Variable
 from .slave import WARNING, Slave
 from .system import Component

@@ -18,6 +18,7 @@ from attitude_fmu.models.attitude.rotations import STANDARD_GRAVITY
 
 from .allan import AllanDeviation, allan_deviation, chi_squared_bounds, pooled
 from .bench import FORCE, RATE, TEMPERATURE, Array, Bench, Benches, Record
+from .errors import SystemRefusedError
 from .interface import Value
 
 Part = Literal["gyro", "accelerometer"]
@@ -64,6 +65,9 @@ _LINES = 40
 _BINS_TO_CUTOFF = 32
 _FIRST_WORDS = 16
 """Words that the filters other than a Bartlett window take to forget."""
+
+_FORGOTTEN = 16.0
+"""Time constants of the analogue pole that leave 1e-7 of a step."""
 
 CELSIUS_ZERO = 273.15
 
@@ -139,12 +143,20 @@ class Clockwork(NamedTuple):
         return round(self.word / self.sample)
 
 
-def clockwork(sensor: Sensor, part: Part) -> Clockwork:
-    """Periods of the part's clock as the FMU calculates them, of the first axis."""
-    axis = "[1]" if part == "gyro" else ""
+def clockworks(sensor: Sensor, part: Part) -> tuple[Clockwork, Clockwork, Clockwork]:
+    """Periods of the clock of each axis as the FMU calculates them; an accelerometer has one clock."""
     with sensor.bench() as bench:
-        names = (f"coefficient.{part}.{name}_period{axis}" for name in ("sense", "word"))
-        return Clockwork(*[bench.value(name) for name in names])
+
+        def of(axis: int) -> Clockwork:
+            place = f"[{axis}]" if part == "gyro" else ""
+            return Clockwork(*[bench.value(f"coefficient.{part}.{name}_period{place}") for name in ("sense", "word")])
+
+        return of(1), of(2), of(3)
+
+
+def clockwork(sensor: Sensor, part: Part) -> Clockwork:
+    """Those of the first axis."""
+    return clockworks(sensor, part)[0]
 
 
 # --- at rest ---------------------------------------------------------------------------------------------------------
@@ -270,14 +282,30 @@ class Response(NamedTuple):
         return float(np.interp(-decibels, -shown[pair], self.frequency[pair]))
 
 
-def frequency_response(sensor: Sensor, part: Part, reference: float, *, folded: bool = False) -> Response:
-    """H(f) = Y(f)/U(f) of one multi-sine on all three axes, without errors; `reference` (Hz) is about the cutoff.
+Axes = tuple[Response, Response, Response]
 
-    Each sine is a whole number of turns in the record; each word counts at the tick at which it can be read first.
-    With `folded` the frequencies are the word rate less these: what words show at the same frequencies as they do.
+
+def frequency_response(sensor: Sensor, part: Part, reference: float, *, folded: bool = False) -> Axes:
+    """H(f) = Y(f)/U(f) of one multi-sine, of each axis at its own clock, without other errors than that of the clock.
+
+    `reference` (Hz) is about the cutoff at the nominal clock. Each sine is a whole number of turns in the record; each
+    word counts at the tick at which it can be read first. With `folded` the frequencies are the word rate less these:
+    what words show at the same frequencies as they do.
+
+    Raises `SystemRefusedError` for a reference that is no frequency.
     """
-    clean = perfect(sensor)
-    clock = clockwork(clean, part)
+    if not (math.isfinite(reference) and reference > 0.0):
+        raise SystemRefusedError(f"reference = {reference} Hz: wanted is a positive frequency, about the cutoff")
+    clean = perfect(sensor, but=("clock_error",))
+    clocks = clockworks(clean, part)
+    nominal = clockwork(perfect(sensor), part).word
+    records = {clock: _swept(clean, part, clock, reference * nominal / clock.word, folded) for clock in set(clocks)}
+    x, y, z = (records[clock][axis] for axis, clock in enumerate(clocks))
+    return x, y, z
+
+
+def _swept(clean: Sensor, part: Part, clock: Clockwork, reference: float, folded: bool) -> list[Response]:
+    """The responses of all axes in one record at this clock; only of those axes that have it are they right."""
     words = max(64, round(_BINS_TO_CUTOFF / (reference * clock.word)))
     bins = words - _bins(words)[::-1] if folded else _bins(words)
     ticks = clock.ticks
@@ -291,14 +319,15 @@ def frequency_response(sensor: Sensor, part: Part, reference: float, *, folded: 
         wave += np.cos(2.0 * np.pi * number * phase + turn)
     peak = float(np.max(np.abs(wave)))
     driven = _driven(clean, part, clock, amplitude / peak * wave)
-    rows = _word_rows(driven, ticks, first, words)
-    output = np.mean(driven[rows], axis=1) * (peak / amplitude)
     frequency = bins / (words * clock.word)
-    turned = np.exp(-2j * np.pi * np.outer(bins, phase[rows]))
-    gain = (turned @ output) * (2.0 / words) * np.exp(-1j * start)
-    if folded:
-        return Response(frequency, gain, math.nan, math.nan)
-    return _response(frequency, gain, reference)
+    found = []
+    for axis in range(3):
+        rows = _word_rows(driven[:, axis], ticks, first, words)
+        turned = np.exp(-2j * np.pi * np.outer(bins, phase[rows]))
+        gain = (turned @ driven[rows, axis]) * (2.0 * peak / (amplitude * words)) * np.exp(-1j * start)
+        plain = Response(frequency, gain, math.nan, math.nan)
+        found.append(plain if folded else _response(frequency, gain, reference))
+    return found
 
 
 def _bins(words: int) -> NDArray[np.int64]:
@@ -320,8 +349,13 @@ def _response(frequency: Array, gain: NDArray[np.complex128], reference: float) 
 
 
 def _settling_words(sensor: Sensor, part: Part) -> int:
-    _, is_window, taps = sensor.item(f"{part}.filter").partition("bartlett_")
-    return 2 * int(taps) + 8 if is_window else _FIRST_WORDS
+    kind = sensor.item(f"{part}.filter")
+    _, is_window, taps = kind.partition("bartlett_")
+    words = 2 * int(taps) + 8 if is_window else _FIRST_WORDS
+    if kind == "decimator":
+        return words
+    pole = _FORGOTTEN / (2.0 * math.pi * sensor.number(f"{part}.bandwidth"))
+    return words + math.ceil(pole / clockwork(sensor, part).word)
 
 
 def _driven(sensor: Sensor, part: Part, clock: Clockwork, wave: Array) -> Array:
@@ -332,8 +366,8 @@ def _driven(sensor: Sensor, part: Part, clock: Clockwork, wave: Array) -> Array:
 
 
 def _word_rows(driven: Array, ticks: int, first: int, words: int) -> NDArray[np.int64]:
-    """The rows at which a new word appeared, `words` of them from row `first` or soon after on."""
-    changed = np.flatnonzero(np.any(np.diff(driven[first:], axis=0) != 0.0, axis=1)) + 1
+    """The rows of an axis at which a new word appeared, `words` of them from row `first` or soon after on."""
+    changed = np.flatnonzero(np.diff(driven[first:]) != 0.0) + 1
     fresh = int(np.argmax(np.bincount(changed % ticks, minlength=ticks)))
     return first + fresh + ticks * np.arange(words)
 
@@ -351,14 +385,14 @@ class StepResponse(NamedTuple):
 
 
 def step_response(sensor: Sensor, part: Part, edges: int = 16) -> StepResponse:
-    """A square wave whose edges fall at ever other moments between two words, without errors."""
-    clean = perfect(sensor)
+    """Of the first axis: a square wave whose edges fall at ever other moments between two words, at its own clock."""
+    clean = perfect(sensor, but=("clock_error",))
     clock = clockwork(clean, part)
     shift = max(1, 2 * clock.ticks // edges)
     half = _settling_words(clean, part) * clock.ticks + shift
     size = 0.25 * clean.number(f"{part}.range")
     wave = np.tile(np.repeat([0.0, size], half), edges // 2 + 1)
-    driven = np.mean(_driven(clean, part, clock, wave), axis=1) / size
+    driven = _driven(clean, part, clock, wave)[:, 0] / size
     fresh = np.flatnonzero(np.diff(driven) != 0.0) + 1
     edge = half * (fresh // half)
     kept = edge > 0
@@ -387,12 +421,12 @@ def filter_settings(sensor: Sensor, part: Part) -> tuple[Setting, ...]:
         return tuple(Setting(item.name.replace("_", "."), {f"{part}.output_data_rate": item.name}) for item in items)
     if kind.startswith("bartlett_"):
         items = interface.variables[f"{part}.filter"].items
-        # the widest range goes with all taps
+        names = [item.name for item in items if item.name.startswith("bartlett_")]
+        # the widest range goes with all taps, and the parts have their taps in common
         widest: dict[str, Value] = {"gyro.range": math.radians(300.0)}
         return tuple(
-            Setting(item.name.removeprefix("bartlett_"), {**widest, f"{part}.filter": item.name})
-            for item in items
-            if item.name.startswith("bartlett_")
+            Setting(name.removeprefix("bartlett_"), {**widest, **{f"{each}.filter": name for each in PARTS}})
+            for name in names
         )
     return (Setting(kind, {}),)
 
@@ -484,6 +518,12 @@ class TemperatureDrift(NamedTuple):
         """The rows on the way up."""
         return slice(0, len(self.temperature) // 2)
 
+    @property
+    def hysteresis(self) -> Array:
+        """Offset on the way up less that on the way down at the same temperatures (n/2, 3)."""
+        up = self.offset[self.warming]
+        return np.asarray(up - self.offset[len(up) :][::-1])
+
     def slope(self, values: Array) -> Array:
         """Change by kelvin (3,): straight line through all rows."""
         return np.asarray(np.polyfit(self.temperature, values, 1)[0])
@@ -542,7 +582,7 @@ def word_rate(sensor: Sensor, part: Part, duration: float = 2.0) -> Array:
     noisy = sensor.but(quiet(sensor, but=("clock_error", "noise_density")), fine(sensor))
     noisy = noisy.but({f"{part}.noise_density": max(noisy.number(f"{part}.noise_density"), 1e-5)})
     word = clockwork(noisy, part).word
-    steps = round(max(duration, 50.0 * word) * 8.0 / word)
+    steps = round(max(duration, 200.0 * word) * 8.0 / word)
     with noisy.bench() as bench:
         found = readings(noisy, part, bench.record(word / 8.0, steps))
     rates = []

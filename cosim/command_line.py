@@ -15,6 +15,7 @@ from attitude_fmu.fmu_src.build import Platforms
 from attitude_fmu.fmu_src.build_messages import Kinds, build_and_tell
 from attitude_fmu.fmu_src.catalogue import Kind
 from attitude_fmu.models.errors import AttitudeFmuError
+from attitude_fmu.models.sensors.devices import DEVICES
 
 # FMPy, numpy and the rest are imported where they are used: --help answers at once
 
@@ -127,6 +128,7 @@ def run_command(
         run(request)
 
 
+_DEVICES = ", ".join(DEVICES)
 _SPECIMEN_HELP = "One piece of the device, drawn from the datasheet's tolerances; 0 is without errors."
 
 
@@ -144,7 +146,8 @@ def build(
         str | None,
         typer.Option(
             metavar="DEVICE",
-            help="Build the attitude sensor with the numbers of this device as start values, as AttitudeSensor_DEVICE.",
+            help="Build the attitude sensor with the numbers of this device as start values, as AttitudeSensor_DEVICE. "
+            f"Devices: {_DEVICES}.",
         ),
     ] = None,
     specimen: Annotated[int, typer.Option(metavar="N", min=0, help=_SPECIMEN_HELP)] = 0,
@@ -156,21 +159,23 @@ def build(
     attitude-fmu build --device ADIS16354_150 --specimen 3
     """
     with _reported():
+        if specimen and device is None:
+            _refuse_usage(f"--specimen {specimen}: of which device? Name one with --device")
         wanted = [*(names or []), *([] if device is None else [_sensor_with(device, specimen)])]
         build_and_tell(dist, wanted or None, Console(), kinds=kind, platforms=platform)
 
 
 def _sensor_with(device: str, specimen: int) -> str:
     """Name of the attitude sensor's FMU with the start values of a device."""
-    from attitude_fmu.models.sensors.devices import parameters
+    from .devices import device_parameters
 
-    parameters(device, specimen)  # an unknown one is refused with those that there are
+    device_parameters(device, specimen)  # an unknown one is refused with those that there are
     return f"AttitudeSensor_{device}" + (f"_specimen_{specimen}" if specimen else "")
 
 
 @application.command()
 def device(
-    name: Annotated[str, typer.Argument(metavar="DEVICE", help="A device, for instance ADXRS453_ADXL355.")],
+    name: Annotated[str, typer.Argument(metavar="DEVICE", help=f"One of {_DEVICES}.")],
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to write.", show_default="DEVICE.ssv")] = None,
     specimen: Annotated[int, typer.Option(metavar="N", min=0, help=_SPECIMEN_HELP)] = 0,
     component: Annotated[
@@ -211,14 +216,14 @@ def info(
 
 SENSOR_HELP = """Measure a modelled sensor and compare it with its datasheet.
 
-DEVICE is one of the parts that the attitude sensor can be: ADXRS450_ADXL355, ADXRS453_ADXL355, ADIS16354_300, \
-ADIS16354_150, ADIS16354_75 and more. Everything is measured on the native FMU itself: Allan deviation, \
+Everything is measured on the native FMU itself: Allan deviation, \
 noise spectrum, frequency response at every setting of the filters, step response, calibration, temperature drift and \
 register codes.
 
 Written into the output folder: \
 gyro.png and accelerometer.png (the pictures), \
-characteristics.csv (the table that is shown: datasheet, modelled part, verdict, source).
+characteristics.csv (the table that is shown: datasheet, modelled part, verdict, rule, source). \
+A FAIL is a finding: the exit code is 0 whenever all has been measured.
 
 [bold]Examples[/bold]
 
@@ -236,7 +241,7 @@ characteristics.csv (the table that is shown: datasheet, modelled part, verdict,
 
 @application.command("sensor", help=SENSOR_HELP)
 def sensor_command(
-    device: Annotated[str, typer.Argument(help="The parts to measure.", metavar="DEVICE")],
+    device: Annotated[str, typer.Argument(help=f"The parts to measure: {_DEVICES}.", metavar="DEVICE")],
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for pictures and table; made if missing.")] = Path(
         "out"
     ),
@@ -244,7 +249,12 @@ def sensor_command(
         bool, typer.Option("--quick", help="Short records and the chosen filter settings only: a few seconds.")
     ] = False,
     specimen: Annotated[
-        int, typer.Option(metavar="N", min=0, help="Which piece of all that the tolerances allow; 0: the nominal one.")
+        int,
+        typer.Option(
+            metavar="N",
+            min=0,
+            help="Which piece of all that the tolerances allow; 0: the nominal one, without errors to measure.",
+        ),
     ] = 1,
     values: Annotated[
         list[str] | None,
@@ -268,8 +278,8 @@ PAPER is [bold]paper-a[/bold] (Jing & Gao 2021: three ADXRS450 and an ADXL355 on
 (2010: an ADIS16354) or [bold]all[/bold]. Each experiment is the sensor on the turntable, run over many seeds: the \
 paper's own way, and ours. A printed number is inside when 5 to 95 % of the seeds enclose it.
 
-Written into the output folder: a picture for each experiment, paper-a.csv and paper-b.csv (the tables that are shown), \
-and trials (the figures of every run, from which an interrupted command goes on).
+Written into the output folder: a picture for each experiment, paper-a.csv and paper-b.csv (the tables that are \
+shown), and trials (the figures of every run, from which an interrupted command goes on).
 
 [bold]Examples[/bold]
 
@@ -296,6 +306,54 @@ def reproduce_command(
         from .reproduce import reproduce
 
         reproduce(paper, out, dist)
+
+
+CALIBRATE_HELP = """Calibrate one piece of a device on the turntable, and show what that gains.
+
+At eight temperatures from -5 to 65 degC, switched on twice at each, the table turns 26 directions of the sensor up \
+and spins it about its axes. Scale, misalignment, g-sensitivity and bias are fitted to the readings, scale and bias \
+with their change with temperature. Then the piece is verified, before and after, at other angles and temperatures.
+
+Written into the output folder: \
+calibration.ssv (the values for the sensor's processor), \
+calibration.csv (every coefficient: true, fitted, standard error), \
+residuals.csv and calibration.png (the errors before and after), \
+and trials (every run, from which an interrupted command goes on).
+
+[bold]Examples[/bold]
+
+  attitude-fmu calibrate --specimen 7 --out piece_7
+
+  attitude-fmu calibrate --device ADIS16354_150 --quick
+
+  attitude-fmu calibrate --set accelerometer.turn_on_bias=0.005
+"""
+
+
+@application.command("calibrate", help=CALIBRATE_HELP, no_args_is_help=False)
+def calibrate_command(
+    device: Annotated[
+        str, typer.Option(metavar="DEVICE", help="The device, for instance ADXRS453_ADXL355.")
+    ] = "ADXRS450_ADXL355",
+    specimen: Annotated[int, typer.Option(metavar="N", min=0, help=_SPECIMEN_HELP)] = 1,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for what is written; made if missing.")] = Path(
+        "out"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="Half the temperatures, switched on once at each.")] = False,
+    values: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the sensor, in SI units. Repeatable."),
+    ] = None,
+    dist: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder of the FMUs, which are built where missing or stale.")
+    ] = Path("dist"),
+) -> None:
+    """Calibrate one piece of a device on the turntable."""
+    with _reported():
+        from .calibrate import CalibrationRequest, calibrate
+
+        settings = _settings(values or [], "write it as parameter=value, for instance seed=7", dotted=False)
+        calibrate(CalibrationRequest(device, specimen, out, dist, quick, settings))
 
 
 DESIGN_HELP = """Design the stabilisation of the camera's line of sight, and prove it.

@@ -7,13 +7,17 @@ sets override single numbers. A set without component, ``component=""``, has the
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+
+from attitude_fmu.fmu_src.errors import did_you_mean
 
 from ..fmu_src.units import BASE_UNITS, parse
 from ..models.attitude_sensor import MODEL
 from ..models.record import Boolean, Enumeration, Fact, Integer, leaves
-from ..models.sensors.devices import parameters
-from .interface import Interface, Item, Unit, Variable
+from ..models.sensors.devices import DEVICES, parameters
+from .errors import SystemRefusedError
+from .interface import Interface, Item, Unit, Value, Variable
 from .ssp import write_ssv
 from .system import ParameterSet
 
@@ -21,12 +25,25 @@ from .system import ParameterSet
 def device_parameters(device: str, specimen: int = 0, component: str = "sensor") -> ParameterSet:
     """Every parameter of a device and of one piece of it, for the attitude sensor that is called `component`.
 
-    Raises `UnknownDeviceError` (an `AttitudeFmuError`) for a device or specimen that there is not.
+    Raises `SystemRefusedError` for a device that there is not, `UnknownDeviceError` for such a specimen.
     """
+    known_device(device)
+    name = f"{device}_specimen_{specimen}" if specimen else device
+    return sensor_parameters(name, parameters(device, specimen), component)
+
+
+def sensor_parameters(name: str, values: Mapping[str, Value], component: str = "sensor") -> ParameterSet:
+    """Parameters of the attitude sensor as a set for the one that is called `component`, with their units."""
     prefix = f"{component}." if component else ""
-    values = {f"{prefix}{name}": value for name, value in parameters(device, specimen).items()}
-    units = {f"{prefix}{name}": unit for name, unit in _units().items() if f"{prefix}{name}" in values}
-    return ParameterSet(f"{device}_specimen_{specimen}" if specimen else device, values, units)
+    units = {f"{prefix}{key}": unit for key, unit in _units().items() if key in values}
+    return ParameterSet(name, {f"{prefix}{key}": value for key, value in values.items()}, units)
+
+
+def known_device(device: str) -> None:
+    """Raise `SystemRefusedError`, with what may be meant, for a device that there is not."""
+    if device not in DEVICES:
+        hint = did_you_mean(device.upper(), DEVICES) or did_you_mean(device, DEVICES)
+        raise SystemRefusedError(f"there is no device called {device!r}{hint} (devices: {', '.join(DEVICES)})")
 
 
 def write_device(path: Path, device: str, specimen: int = 0, component: str = "sensor") -> Path:
@@ -34,9 +51,16 @@ def write_device(path: Path, device: str, specimen: int = 0, component: str = "s
 
     Raises `ResultsError` if the file cannot be written.
     """
+    return write_sensor_parameters(path, device_parameters(device, specimen, component), component)
+
+
+def write_sensor_parameters(path: Path, parameters: ParameterSet, component: str = "sensor") -> Path:
+    """Write what `sensor_parameters` gave for this `component` as an ``.ssv`` file.
+
+    Raises `ResultsError` if the file cannot be written.
+    """
     variables = {name: _variable(name, fact) for name, fact in _facts().items()}
-    interface = Interface(MODEL.name, variables, {}, None)
-    return write_ssv(device_parameters(device, specimen, component), path, {component: interface})
+    return write_ssv(parameters, path, {component: Interface(MODEL.name, variables, {}, None)})
 
 
 def _facts() -> dict[str, Fact]:

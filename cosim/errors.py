@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from difflib import get_close_matches
 from typing import Any
 
 from attitude_fmu.models.errors import AttitudeFmuError
@@ -39,9 +37,3 @@ class RunStoppedError(AttitudeFmuError, RuntimeError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (str(self), self.time, self.results, self.interrupted)
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """A hint that names what is spelt like `name`, or nothing."""
-    close = get_close_matches(name, list(known), n=3, cutoff=0.6)
-    return f"; did you mean {' or '.join(close)}?" if close else ""

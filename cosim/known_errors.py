@@ -1,27 +1,21 @@
 """What a flawless calibration would give the processor: a piece's own errors, taken from its parameters.
 
-    M = (diag(1 + k_s (T - 25 degC)) S)^-1,   b = b0 + k_b (T - 25 degC)   at the temperature of the calibration
-
 It stands for a laboratory's calibration where an experiment is not about calibrating.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..models.attitude.rotations import STANDARD_GRAVITY
 from ..models.attitude_sensor import MODEL, Coefficients, Parameters
 from ..models.record import defaults, with_defaults
 from ..models.sensors.accelerometer import AccelerometerParameters
 from ..models.sensors.datasheet import REFERENCE_TEMPERATURE
 from ..models.sensors.devices import parameters
 from ..models.sensors.gyro import GyroParameters
-
-Part = GyroParameters | AccelerometerParameters
+from .calibration import ErrorModel, compensation, true_errors
 
 
 def known_compensation(
@@ -29,45 +23,30 @@ def known_compensation(
 ) -> dict[str, float]:
     """The processor's ``compensation.*`` for a piece that was calibrated in an `enclosure` (K) around it.
 
-    With `by_temperature` the offsets' slopes are known too, over the parts' own thermometers; without, the offsets are
-    those of the calibration's temperature. Raises `UnknownDeviceError` for a piece that there is not.
+    With `by_temperature` the change of scale and bias is known too, over the parts' own thermometers; without, the
+    errors are those of the calibration's temperature. Raises `UnknownDeviceError` for a piece that there is not.
     """
     p: Parameters = defaults(with_defaults(Parameters, parameters(device, specimen)))
     k: Coefficients = MODEL.coefficients(p)
-    linear, cubic = k.accelerometer.cubic
-    # the straight line that fits x + c3 x^3 - c1 x best over +-1 g
-    gain = 1.0 - linear + 0.6 * cubic * STANDARD_GRAVITY**2
-    values = {
-        **_matrix("accelerometer_matrix", _inverse(p.accelerometer, k.accelerometer.sensitivity, enclosure) / gain),
-        **_matrix("gyro_matrix", _inverse(p.gyro, k.gyro.sensitivity, enclosure)),
-        **_matrix("g_sensitivity", k.gyro.g_sensitivity),
-        **_offsets("accelerometer_bias", p.accelerometer, enclosure, by_temperature),
-        **_offsets("gyro_bias", p.gyro, enclosure, by_temperature),
-    }
-    return {f"{component}.compensation.{name}": float(value) for name, value in values.items()}
-
-
-def _warmer(part: Part, enclosure: float) -> float:
-    """The die above the temperature that the sheets' numbers hold at, K."""
-    return enclosure + part.thermal.self_heating - REFERENCE_TEMPERATURE
-
-
-def _inverse(part: Part, sensitivity: Any, enclosure: float) -> NDArray[np.float64]:
-    factor = 1.0 + np.array(part.scale_temperature_slope) * _warmer(part, enclosure)
-    return np.asarray(np.linalg.inv(factor[:, None] * np.array(sensitivity)))
-
-
-def _offsets(name: str, part: Part, enclosure: float, by_temperature: bool) -> Mapping[str, float]:
-    bias, slope = np.array(part.bias), np.array(part.bias_temperature_slope)
+    gyro, accelerometer = true_errors(p, k)
     if not by_temperature:
-        return _vector(name, bias + slope * _warmer(part, enclosure))
-    # over what the thermometer reads, its own error included
-    return {**_vector(name, bias - slope * part.thermometer.error), **_vector(f"{name}_temperature_slope", slope)}
+        gyro = _at_one_temperature(gyro, _warmth(p.gyro, enclosure))
+        accelerometer = _at_one_temperature(accelerometer, _warmth(p.accelerometer, enclosure))
+    return {f"{component}.{name}": value for name, value in compensation(gyro, accelerometer).items()}
 
 
-def _vector(name: str, values: Any) -> dict[str, float]:
-    return {f"{name}[{i}]": value for i, value in enumerate(values, 1)}
+def _warmth(part: GyroParameters | AccelerometerParameters, enclosure: float) -> float:
+    """What the part's thermometer reads above 25 degC once the die is warm, K."""
+    return enclosure + part.thermal.self_heating + part.thermometer.error - REFERENCE_TEMPERATURE
 
 
-def _matrix(name: str, rows: Any) -> dict[str, float]:
-    return {f"{name}[{i},{j}]": value for i, row in enumerate(rows, 1) for j, value in enumerate(row, 1)}
+def _at_one_temperature(found: ErrorModel, warmth: float) -> ErrorModel:
+    """The errors as they are at `warmth` (K above 25 degC), not changing."""
+    none: Any = np.zeros(3)
+    return found._replace(
+        sensitivity=(1.0 + found.scale_temperature_slope * warmth)[:, None] * found.sensitivity,
+        scale_temperature_slope=none,
+        bias=found.bias + found.bias_temperature_slope * warmth + found.bias_temperature_curve * warmth**2,
+        bias_temperature_slope=none,
+        bias_temperature_curve=none,
+    )

@@ -21,7 +21,9 @@ from typing import Any, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 
-from .errors import RunStoppedError, SystemRefusedError, did_you_mean
+from attitude_fmu.fmu_src.errors import did_you_mean
+
+from .errors import RunStoppedError, SystemRefusedError
 from .interface import Interface, Variable
 from .interrupts import Progress, Watch, noted_interrupts
 from .recording import Recording, Results, keep

@@ -4,12 +4,14 @@
     figures = run_trials(trials, Path("out/trials"))
 
 What a trial gave lies in a file of its name, with the key of all that it follows from: the bytes of its FMUs, their
-connections and values, the experiment, and the source of the function that takes the figures. An interrupted study goes
-on where it stopped; a trial whose key has changed is run again.
+connections and values, the experiment, and the function that takes the figures with the source of its module and of
+those that this imports from its own folder, and so on. An interrupted study goes on where it stopped; a trial whose key
+has changed is run again.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import inspect
 import multiprocessing
@@ -17,7 +19,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 from zipfile import BadZipFile
@@ -161,12 +163,7 @@ def _figures(trial: Trial) -> Figures:
 
 def _keys(trials: Sequence[Trial]) -> dict[str, str]:
     """By name, a hash of all that a trial's figures follow from."""
-    contents: dict[Path, str] = {}
-
-    def content(path: Path) -> str:
-        if path not in contents:
-            contents[path] = hashlib.sha256(path.read_bytes()).hexdigest()
-        return contents[path]
+    content, sources = cache(_content), cache(_sources)
 
     def key(trial: Trial) -> str:
         system = trial.system
@@ -175,18 +172,50 @@ def _keys(trials: Sequence[Trial]) -> dict[str, str]:
             system.connections,
             [sorted(one.values.items()) for one in system.parameter_sets],
             (system.start_time, trial.stop_time, trial.record, trial.step, trial.interval, trial.order),
-            _code(trial.take, content),
+            _code(trial.take, sources),
         ]
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
     return {trial.name: key(trial) for trial in trials}
 
 
-def _code(take: Take, content: Callable[[Path], str]) -> tuple[Any, ...]:
-    """The function and its fixed arguments, and the source of its module."""
+def _content(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _sources(module: Path) -> tuple[tuple[str, str], ...]:
+    """Name and content of a module and of all in its folder that it counts on, through imports of imports."""
+    found: set[Path] = set()
+    waiting = {module}
+    while waiting:
+        found |= waiting
+        waiting = {path for one in waiting for path in _neighbours(one)} - found
+    return tuple((path.name, _content(path)) for path in sorted(found))
+
+
+def _neighbours(module: Path) -> Iterator[Path]:
+    """The modules of the same folder that a module imports."""
+    for name in _imported(ast.parse(module.read_bytes())):
+        path = module.with_name(f"{name}.py")
+        if path.is_file():
+            yield path
+
+
+def _imported(tree: ast.Module) -> Iterator[str]:
+    """Last names of the modules imported absolutely or from the same package."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import(names=names) | ast.ImportFrom(module=None, names=names, level=1):
+                yield from (one.name.rpartition(".")[2] for one in names)
+            case ast.ImportFrom(module=str(name), level=0 | 1):
+                yield name.rpartition(".")[2]
+
+
+def _code(take: Take, sources: Callable[[Path], Any]) -> tuple[Any, ...]:
+    """The function and its fixed arguments, and the sources that it counts on."""
     if isinstance(take, partial):
-        return (*_code(take.func, content), take.args, sorted(take.keywords.items()))
-    return take.__module__, take.__qualname__, content(Path(inspect.getfile(take)))
+        return (*_code(take.func, sources), take.args, sorted(take.keywords.items()))
+    return take.__module__, take.__qualname__, sources(Path(inspect.getfile(take)))
 
 
 def _kept(path: Path, key: str) -> Figures | None:

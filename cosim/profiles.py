@@ -20,12 +20,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from attitude_fmu.fmu_src.errors import did_you_mean
+
 from ..fmu_src.units import UnknownUnitError, display_of
 from ..models.errors import ValueRefusedError, digits
 from ..models.plants.turntable_profile import KIND, NO_AXES, ROWS, Axes, Row
 from ..models.record import check, flatten
 from ..models.scalar import PI
-from .errors import ResultsError, SystemRefusedError, did_you_mean
+from .errors import ResultsError, SystemRefusedError
 from .system import ParameterSet
 
 ROOM_TEMPERATURE = 293.15
@@ -279,21 +281,32 @@ def _degrees(middle: float, inner: float) -> Axes:
     return Axes(0.0, middle * _DEG, inner * _DEG)
 
 
-def _sweep(name: str, rows: Iterable[tuple[str, float, float]], rest: float, speed: float = 0.0) -> Profile:
-    """Rests at angles of middle and inner axis in degrees, one after the other, first of all 30 s level."""
-    level = move("level", NO_AXES, 30.0)
+def _sweep(
+    name: str, first: ProfileRow, rows: Iterable[tuple[str, float, float]], rest: float, speed: float = 0.0
+) -> Profile:
+    """After the first row, rests at angles of middle and inner axis in degrees, one after the other."""
     moves = [move(label, _degrees(middle, inner), rest, speed * _DEG) for label, middle, inner in rows]
-    return Profile(name, (level, *moves))
+    return Profile(name, (first, *moves))
 
 
 _STEPS = (-20.0, -10.0, 0.0, 10.0, 20.0)
 _ANGLES = (0.0, 10.0, 20.0, 30.0, 40.0)
+
+PAPER_B_START = 36.0
+"""s at rest before all else: the 2010 device nulls its bias for 30 s of a clock that may be 3 % slow, then levels."""
+
+PAPER_B_BESIDE = 20.0
+"""deg, of the axis that is not turned, in all four tables of the 2010 paper."""
+
+_PITCHING = move("pitch 0 deg, null", _degrees(0.0, PAPER_B_BESIDE), PAPER_B_START)
+_ROLLING = move("roll 0 deg, null", _degrees(PAPER_B_BESIDE, 0.0), PAPER_B_START)
 
 PAPER_A_STATIC = Profile("paper-a-static", (move("inner 43.5 deg", _degrees(0.0, 43.5), 120.0),))
 """Jing & Gao 2021, figures 6 to 9: inner axis at 43.5 deg. The record's length is an assumption."""
 
 PAPER_A_SWEEP = _sweep(
     "paper-a-sweep",
+    move("level", NO_AXES, 30.0),
     [
         *[(f"inner {angle:g} deg", 0.0, angle) for angle in _STEPS],
         *[(f"middle {angle:g} deg", angle, 0.0) for angle in _STEPS],
@@ -303,20 +316,32 @@ PAPER_A_SWEEP = _sweep(
 """Jing & Gao 2021: inner axis -20 to 20 deg with the middle one at 0, then the other way round; at the default limits
 of 10 deg/s and 10 deg/s^2, which are theirs. The length of the rests is an assumption."""
 
-PAPER_B_PITCH = _sweep("paper-b-pitch", [(f"pitch {angle:g} deg", angle, 20.0) for angle in _ANGLES], 10.0)
-"""The 2010 paper, table 1: pitch at 0 to 40 deg, roll at 20 deg; 30 s level, in which its device nulls its bias."""
+PAPER_B_PITCH = _sweep(
+    "paper-b-pitch", _PITCHING, [(f"pitch {angle:g} deg", angle, PAPER_B_BESIDE) for angle in _ANGLES], 10.0
+)
+"""The 2010 paper, table 1: pitch at 0 to 40 deg, roll at 20 deg. The table starts there (`initial_angle`)."""
 
-PAPER_B_ROLL = _sweep("paper-b-roll", [(f"roll {angle:g} deg", 20.0, angle) for angle in _ANGLES], 10.0)
+PAPER_B_ROLL = _sweep(
+    "paper-b-roll", _ROLLING, [(f"roll {angle:g} deg", PAPER_B_BESIDE, angle) for angle in _ANGLES], 10.0
+)
 """The 2010 paper, table 2: roll at 0 to 40 deg, pitch at 20 deg."""
 
 PAPER_B_PITCH_TURNS = _sweep(
-    "paper-b-pitch-turns", [(f"pitch {angle:g} deg", angle, 0.0) for angle in _ANGLES[1:]], 0.1, 1.0
+    "paper-b-pitch-turns",
+    _PITCHING,
+    [(f"pitch {angle:g} deg", angle, PAPER_B_BESIDE) for angle in _ANGLES[1:]],
+    0.1,
+    1.0,
 )
 """The 2010 paper, table 3: pitch turned from 0 to 10, 20, 30, 40 deg at 1 deg/s, the rate that its drift implies; the
 rests are as short as results can be taken in."""
 
 PAPER_B_ROLL_TURNS = _sweep(
-    "paper-b-roll-turns", [(f"roll {angle:g} deg", 0.0, angle) for angle in _ANGLES[1:]], 0.1, 1.0
+    "paper-b-roll-turns",
+    _ROLLING,
+    [(f"roll {angle:g} deg", PAPER_B_BESIDE, angle) for angle in _ANGLES[1:]],
+    0.1,
+    1.0,
 )
 """The 2010 paper, table 4: the same in roll."""
 

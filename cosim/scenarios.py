@@ -12,9 +12,10 @@ from rich.console import Console
 from attitude_fmu.fmu_src.build import folder_of
 from attitude_fmu.fmu_src.build_messages import build_and_tell
 from attitude_fmu.fmu_src.catalogue import Kind
+from attitude_fmu.fmu_src.errors import did_you_mean
 from attitude_fmu.models.attitude.rotations import REFERENCE_LATITUDE, STANDARD_GRAVITY, earth_rate_n
 
-from .errors import SystemRefusedError, did_you_mean
+from .errors import SystemRefusedError
 from .interface import Value
 from .ssp import open_ssp
 from .system import Component, ParameterSet, System, connect
@@ -102,7 +103,9 @@ _PLANT = (
     "plant.rate*",
     "plant.specific_force*",
     "plant.joint.*",
+    "plant.motor_current.*",
     "plant.tripod_deflection.*",
+    "plant.head_deflection.*",
     "plant.wind_speed",
 )
 

@@ -13,15 +13,16 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from attitude_fmu.fmu_src.build import build_all
 from attitude_fmu.models.sensors.datasheet import Origin
-from attitude_fmu.models.sensors.devices import DEVICES, device_called, origins
+from attitude_fmu.models.sensors.devices import device_called, origins
 
 from .bench import benches, settable
 from .characteristics import PARTS, Part, Sensor
-from .devices import device_parameters
-from .errors import ResultsError, SystemRefusedError, did_you_mean
+from .devices import device_parameters, known_device
+from .errors import ResultsError, SystemRefusedError
 from .interface import Interface, Value, read_interface
 from .sensor_findings import FULL, QUICK, Findings, Stage, findings
 from .sensor_report import Line, lines, summary, table, write_table
+from .sheet_claims import sheet_claims
 
 _IDENTIFIER = "AttitudeSensor"
 _TABLE = "characteristics.csv"
@@ -47,7 +48,6 @@ def values_of(device: str, specimen: int = 0) -> dict[str, Value]:
 
     Raises `SystemRefusedError` for a device that is not known.
     """
-    _known(device)
     return dict(device_parameters(device, specimen, component="").values)
 
 
@@ -56,14 +56,8 @@ def sources_of(device: str) -> dict[str, Origin]:
 
     Raises `SystemRefusedError` for a device that is not known.
     """
-    _known(device)
+    known_device(device)
     return origins(device)
-
-
-def _known(device: str) -> None:
-    if device not in DEVICES:
-        hint = did_you_mean(device.upper(), DEVICES) or did_you_mean(device, DEVICES)
-        raise SystemRefusedError(f"there is no device called {device!r}{hint} (devices: {', '.join(DEVICES)})")
 
 
 def show_sensor(request: SensorRequest) -> None:
@@ -79,9 +73,8 @@ def show_sensor(request: SensorRequest) -> None:
         chosen = {**values, **_settings(interface, request.settings)}
         with _stages() as (stage, progress), benches(fmu, interface, progress) as made:
             sensor = Sensor(made, chosen)
-            if sensor.number("ideal") > 0.5:
-                raise SystemRefusedError("ideal = true: a sensor without errors, filters and clocks cannot be measured")
-            found = findings(sensor, QUICK if request.quick else FULL, stage)
+            _refuse_experiments(sensor)
+            found = findings(sensor, sheet_claims(request.device), QUICK if request.quick else FULL, stage)
             told = lines(found, sources)
             stage("drawing", 0.0)
             files = _written(request, sensor, found, told, Path(name))
@@ -111,7 +104,36 @@ def _drafts(out: Path) -> tempfile.TemporaryDirectory[str]:
 
 def _settings(interface: Interface, settings: Mapping[str, Value]) -> dict[str, Value]:
     """The settings as values of their variables' types. Raises `SystemRefusedError` for what cannot be set."""
-    return {name: settable(interface, name).value(value) for name, value in settings.items()}
+    found = {}
+    for name, value in settings.items():
+        variable = settable(interface, name)
+        if variable.causality == "input":
+            raise SystemRefusedError(f"{name} is an input: the bench drives it, only parameters can be set here")
+        found[name] = variable.value(value)
+    return found
+
+
+_LEFT_ALONE: tuple[tuple[str, float, str], ...] = (
+    ("ideal", 0.0, "a sensor without errors, filters and clocks cannot be measured"),
+    ("heater.enabled", 0.0, "the temperatures would be the thermostat's, not the bench's"),
+    ("gyro.self_test", 0.0, "the self-test would be taken for an offset"),
+    ("accelerometer.self_test", 0.0, "the self-test would be taken for an offset"),
+    ("gyro.autonull", 1.0, "the part would take its own errors away"),
+    ("accelerometer.high_pass", 1.0, "offset, step and delay of what lets nothing steady pass are not the sheet's"),
+    ("fault[1].kind", 1.0, "a part with a fault is not what the sheet describes"),
+    ("fault[2].kind", 1.0, "a part with a fault is not what the sheet describes"),
+)
+"""Parameters that must stand at this number in a measurement, and why."""
+
+
+def _refuse_experiments(sensor: Sensor) -> None:
+    """Raise `SystemRefusedError` for settings under which a part is not what its sheet describes."""
+    for name, wanted, why in _LEFT_ALONE:
+        value = sensor.number(name)
+        if value != wanted:
+            variable = sensor.benches.interface.variables[name]
+            shown = sensor.item(name) if variable.items else str(value > 0.5).lower()
+            raise SystemRefusedError(f"{name} = {shown}: {why}; leave it as it is to measure the sensor")
 
 
 def _written(
@@ -121,7 +143,8 @@ def _written(
 
     files = [write_table(folder / _TABLE, told)]
     for part in PARTS:
-        sheet = Sheet(_part_name(request.device, part), _heading(request), sources_of(request.device), summary(told))
+        counted = summary(told, part)
+        sheet = Sheet(_part_name(request.device, part), _heading(request), sources_of(request.device), counted)
         files.append(plot_sensor(folder / f"{part}.png", sensor, found[part], sheet))
     return files
 
@@ -139,7 +162,7 @@ def _heading(request: SensorRequest) -> str:
 
 def _tell(request: SensorRequest, told: tuple[Line, ...], names: list[str]) -> None:
     console = Console()
-    console.print(table(told, _heading(request)))
+    console.print(table(told, _heading(request), console.width))
     console.print(f"{summary(told)}.", highlight=False)
     console.print(f"In {request.out}: {', '.join(names)}", highlight=False, markup=False, soft_wrap=True)
 

@@ -15,11 +15,11 @@ from attitude_fmu.models.sensors.datasheet import UNSURE, Datum, Origin, Toleran
 from .allan import combined, modelled_instability, pooled, rate_random_walk, rounding, white_noise
 from .bench import Array
 from .characteristics import Part, Response, Sensor
-from .filter_claims import HALF_POWER
+from .filter_claims import HALF_POWER, FilterClaim
 from .identification import power_spectrum
 from .plot import STYLE
-from .sensor_findings import Findings, word_period
-from .sensor_report import UNITS, bounds, floor_of, shown
+from .sensor_findings import Findings
+from .sensor_report import SAME_CLOCK, UNITS, bounds, floor_of, limits_name, shown
 from .workspace import whole_or_not
 
 # matplotlib is imported where a picture is made: most commands need none
@@ -57,6 +57,11 @@ class _Drawn(NamedTuple):
         """The value of one of the part's parameters."""
         return self.sensor.number(f"{self.part}.{name}")
 
+    @property
+    def density(self) -> float:
+        """Of the modelled white noise as the words show it."""
+        return self.modelled("noise_density") * self.found.claims.nominal.density_gain
+
     def datum(self, name: str) -> Datum | None:
         """The sheet's number for it, None where there is none or it is zero for want of one."""
         origin = self.sheet.origins.get(f"{self.part}.{name}")
@@ -88,13 +93,23 @@ def plot_sensor(path: Path, sensor: Sensor, found: Findings, sheet: Sheet) -> Pa
 
 
 def _headings(figure: Figure, drawn: _Drawn) -> None:
-    name = drawn.sheet.name.replace("+-", "±")
+    name = drawn.sheet.name.replace("+-", "±").replace("deg", "°")
     figure.text(0.012, 0.985, f"{name}, as modelled", va="top", fontsize=13, fontweight="bold")
-    lines = f"{drawn.sheet.heading}   ·   measured on the FMU   ·   {drawn.sheet.summary}"
+    lines = f"{drawn.sheet.heading}   ·   measured on the FMU   ·   {drawn.part}: {drawn.sheet.summary}"
     figure.text(0.012, 0.949, lines, va="top", fontsize=9.5)
-    legend = "of the datasheet   (hollow, dotted: unsure, not from the part's own sheet)"
+    is_unsure = any(
+        origin.confidence in UNSURE
+        for name, origin in drawn.sheet.origins.items()
+        if name in _drawn_origins(drawn.part)
+    )
+    legend = "of the datasheet" + ("   (hollow, dotted: unsure, not from the part's own sheet)" if is_unsure else "")
     figure.text(0.0155, 0.925, "◆", va="top", fontsize=9.5, color=_SHEET)
     figure.text(0.0275, 0.925, legend, va="top", fontsize=9.5)
+
+
+def _drawn_origins(part: Part) -> set[str]:
+    """Parameters whose sheet's numbers a picture shows."""
+    return {f"{part}.{name}" for name in ("noise_density", "bias_instability", "bias_temperature_slope[1]", "filter")}
 
 
 def _is_unsure(confidence: str) -> bool:
@@ -126,9 +141,10 @@ def _allan(axes: Axes, drawn: _Drawn) -> None:
     axes.loglog(tau, _theory(tau, drawn) / size, color=_THEORY, lw=1.1, ls=(0, (4, 2)), label="theory", zorder=4)
     density, floor = drawn.datum("noise_density"), drawn.datum("bias_instability")
     if density is not None:
-        y = density.si / math.sqrt(2.0) / size
+        gain = found.claims.nominal.density_gain
+        y = density.si * gain / math.sqrt(2.0) / size
         _marker(axes, 1.0, y, density.confidence)
-        text = f"D/√2 at 1 s,\nD = {density.value:g} {_plain(density.unit)}"
+        text = f"D/√2 at 1 s,\nD = {density.value * gain:.4g} {_plain(density.unit)}"
         _note(axes, 1.0, y, text, (8, 8))
     if floor is not None:
         y = floor_of(floor) / size
@@ -148,12 +164,12 @@ def _theory(tau: Array, drawn: _Drawn) -> Array:
         bias_instability.SIGMA_PER_INSTABILITY,
     )
     total = combined(
-        white_noise(tau, drawn.modelled("noise_density")),
+        white_noise(tau, drawn.density),
         instability,
         rate_random_walk(tau, drawn.modelled("rate_random_walk")),
         rounding(tau, drawn.modelled("resolution"), 1.0 / drawn.found.at_rest.rate),
     )
-    return np.where(tau < 3.0 * drawn.found.claim.delay, np.nan, total)
+    return np.where(tau < 3.0 * drawn.found.claims.nominal.delay, np.nan, total)
 
 
 def _duration(seconds: float) -> str:
@@ -196,7 +212,7 @@ def _spectrum(axes: Axes, drawn: _Drawn) -> None:
     at = np.geomspace(frequency[0], 0.5 * found.at_rest.rate, 300)
     axes.loglog(
         at,
-        _spectral_theory(at, drawn) * np.sqrt(_power_as_read(at, found)) / size,
+        _spectral_theory(at, drawn) / size,
         color=_THEORY,
         lw=1.1,
         ls=(0, (4, 2)),
@@ -204,9 +220,10 @@ def _spectrum(axes: Axes, drawn: _Drawn) -> None:
     )
     datum = drawn.datum("noise_density")
     if datum is not None:
-        y = datum.si / size
+        gain = found.claims.nominal.density_gain
+        y = datum.si * gain / size
         _line(axes, y, datum.confidence)
-        text = f"{datum.value:g} {_plain(datum.unit)}"
+        text = f"{datum.value * gain:.4g} {_plain(datum.unit)}"
         axes.text(0.98, y, text, transform=axes.get_yaxis_transform(), ha="right", **_over())
     axes.set_ylim(bottom=max(0.03 * float(np.median(density)), 0.3 * float(np.min(density))) / size)
     _plain_ticks(axes)
@@ -250,15 +267,18 @@ def _joined_spectrum(readings: Array, rate: float) -> tuple[Array, Array]:
 
 
 def _spectral_theory(frequency: Array, drawn: _Drawn) -> Array:
-    """sqrt(D^2 + sum 4 sigma^2 T/(1 + (2 pi f T)^2) + 2 K^2/(2 pi f)^2 + q^2 T/6): one-sided, before the filter."""
+    """sqrt(P (D^2 + sum 4 sigma^2 T/(1 + (2 pi f T)^2) + 2 K^2/(2 pi f)^2) + q^2/(6 r)): one-sided, as read.
+
+    The register rounds behind the filter, which leaves P of the power of what comes before.
+    """
     sigma = drawn.modelled("bias_instability") * bias_instability.SIGMA_PER_INSTABILITY
     turn = 2.0 * np.pi * frequency
-    total = np.full(len(frequency), drawn.modelled("noise_density") ** 2)
+    total = np.full(len(frequency), drawn.density**2)
     for constant in bias_instability.TIME_CONSTANTS:
         total += 4.0 * sigma**2 * constant / (1.0 + (turn * constant) ** 2)
     total += 2.0 * drawn.modelled("rate_random_walk") ** 2 / turn**2
-    total += drawn.modelled("resolution") ** 2 / (6.0 * drawn.found.at_rest.rate)
-    return np.asarray(np.sqrt(total))
+    rounded = drawn.modelled("resolution") ** 2 / (6.0 * drawn.found.at_rest.rate)
+    return np.asarray(np.sqrt(total * _power_as_read(frequency, drawn.found) + rounded))
 
 
 # --- temperature -----------------------------------------------------------------------------------------------------
@@ -278,15 +298,15 @@ def _temperature(axes: Axes, drawn: _Drawn) -> None:
         down = slice(up.stop, None)
         axes.plot(drift.temperature[down], away[down, number], color=colour, lw=1.3, ls=(0, (3, 2)))
     axes.set_xlim(float(drift.temperature.min()), float(drift.temperature.max()))
-    axes.set_xlabel("ambient temperature (°C), falling dashed", labelpad=1)
+    is_loop = float(np.max(np.abs(drift.hysteresis))) > 1e-3 * float(np.max(np.abs(drift.offset)))
+    axes.set_xlabel(f"ambient temperature (°C){', falling dashed' if is_loop else ''}", labelpad=1)
     axes.legend(loc="upper center", ncols=4, handlelength=1.2, columnspacing=1.0)
 
 
 def _cone(axes: Axes, tolerance: Tolerance, temperature: Array, size: float) -> None:
     low, high = (bound / size * (temperature - 25.0) for bound in bounds(tolerance))
     unsure = _is_unsure(tolerance.confidence)
-    what = "3 sigma" if tolerance.reading == "sigma" and not math.isfinite(tolerance.limit) else "limits"
-    label = f"sheet, {what}"
+    label = f"sheet, {limits_name(tolerance)}"
     axes.fill_between(temperature, low, high, color=_SHEET, alpha=0.1, lw=0, zorder=0, label=label)
     for edge in (low, high):
         axes.plot(temperature, edge, color=_SHEET, lw=0.9, ls=":" if unsure else "--")
@@ -295,21 +315,47 @@ def _cone(axes: Axes, tolerance: Tolerance, temperature: Array, size: float) -> 
 # --- responses -------------------------------------------------------------------------------------------------------
 
 
+class _Curve(NamedTuple):
+    """A response to draw, what the sheet says of it at its clock, and what it is called."""
+
+    response: Response
+    claim: FilterClaim
+    colour: str
+    label: str
+    axis: str
+
+
+def _curves(found: Findings) -> list[_Curve]:
+    """One for each axis where their clocks differ."""
+    if float(np.ptp(found.clocks)) <= SAME_CLOCK:
+        label = "modelled, as set" if found.settings else "modelled"
+        return [_Curve(found.responses[0], found.claims.x, _MODEL, label, "")]
+    triads = zip(found.responses, found.claims.own, _AXES.items(), strict=True)
+    return [_Curve(response, claim, colour, axis, f"{axis}: ") for response, claim, (axis, colour) in triads]
+
+
 def _gain(axes: Axes, drawn: _Drawn) -> None:
     found = drawn.found
     axes.set_title("Frequency response: gain (dB)")
     axes.axhline(HALF_POWER, color=_THEORY, lw=0.6)
     for one in found.settings:
-        axes.semilogx(one.response.frequency, one.response.decibels, color=_REST, lw=0.9)
-    response = found.response
-    axes.semilogx(response.frequency, response.decibels, color=_MODEL, lw=1.6, label="modelled, as set")
+        axes.semilogx(one.responses[0].frequency, one.responses[0].decibels, color=_REST, lw=0.9)
+    for curve in _curves(found):
+        axes.semilogx(curve.response.frequency, curve.response.decibels, color=curve.colour, lw=1.6, label=curve.label)
     if found.settings:
         axes.plot([], [], color=_REST, lw=0.9, label="every other setting")
-    for claim in [one.claim for one in found.settings] or [found.claim]:
+    for claim in [one.claims.x for one in found.settings] or [curve.claim for curve in _curves(found)]:
         if math.isfinite(claim.frequency):
             _marker(axes, claim.frequency, claim.decibels, claim.confidence)
-    frequency = response.frequency_of(found.claim.decibels)
-    text = f"{found.claim.decibels:.2f} dB at {shown(frequency)} Hz\nsheet: {shown(found.claim.frequency)} Hz"
+    decibels = f"{found.claims.nominal.decibels:.2f} dB"
+    told = [f"{decibels} at"]
+    for curve in _curves(found):
+        measured, claimed = curve.response.frequency_of(curve.claim.decibels), curve.claim.frequency
+        if math.isfinite(measured) and math.isfinite(claimed):
+            told.append(f"{curve.axis}{shown(measured)} Hz, sheet {shown(claimed)} Hz")
+        else:
+            told.append(f"{curve.axis}no frequency below half the word rate")
+    text = "\n".join(told)
     box: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
     text = text.replace("-", _MINUS)
     axes.text(0.03, 0.30, text, transform=axes.transAxes, fontsize=8.5, va="bottom", bbox=box, zorder=7)
@@ -323,7 +369,7 @@ def _delay(axes: Axes, drawn: _Drawn) -> None:
     if drawn.found.settings:
         _delay_by_setting(axes, drawn)
     else:
-        _delay_by_frequency(axes, drawn.found.response, drawn)
+        _delay_by_frequency(axes, drawn)
 
 
 def _delay_by_setting(axes: Axes, drawn: _Drawn) -> None:
@@ -331,11 +377,11 @@ def _delay_by_setting(axes: Axes, drawn: _Drawn) -> None:
     is_rate = settings[0].setting.label.endswith("Hz")
     axes.set_title("Delay by output data rate (ms)" if is_rate else "Delay by taps (ms)")
     places = np.arange(len(settings))
-    modelled = np.array([1e3 * one.response.delay for one in settings])
+    modelled = np.array([1e3 * one.responses[0].delay for one in settings])
     axes.semilogy(places, modelled, "o-", color=_MODEL, ms=4.5, lw=0.9, label="modelled")
     for place, one in zip(places, settings, strict=True):
-        claimed = 1e3 * one.claim.delay
-        _marker(axes, float(place), claimed, one.claim.confidence)
+        claimed = 1e3 * one.claims.x.delay
+        _marker(axes, float(place), claimed, one.claims.nominal.confidence)
         away = 100.0 * (modelled[place] / claimed - 1.0)
         _percent(axes, float(place), max(claimed, modelled[place]), away)
     labels = [one.setting.label.removesuffix(".Hz") for one in settings]
@@ -349,41 +395,50 @@ def _delay_by_setting(axes: Axes, drawn: _Drawn) -> None:
 
 
 def _percent(axes: Axes, x: float, y: float, away: float) -> None:
-    text = "0.0%" if abs(away) < 0.05 else f"{away:+.1f}%".replace("-", _MINUS)
+    if abs(away) < 0.05:
+        return
+    text = f"{away:+.1f}%".replace("-", _MINUS)
     axes.annotate(text, (x, y), (0, 8), textcoords="offset points", fontsize=7.5, ha="center")
 
 
-def _delay_by_frequency(axes: Axes, response: Response, drawn: _Drawn) -> None:
-    claim = drawn.found.claim
+def _delay_by_frequency(axes: Axes, drawn: _Drawn) -> None:
+    claim, curves = drawn.found.claims.nominal, _curves(drawn.found)
     axes.set_title("Frequency response: delay (ms)")
-    passed = response.decibels > -12.0
-    axes.plot(response.frequency[passed], 1e3 * response.delays[passed], color=_MODEL, lw=1.6, label="modelled")
-    _line(axes, 1e3 * claim.delay, claim.confidence)
+    spread = np.zeros(0)
+    for curve in curves:
+        response = curve.response
+        passed = response.decibels > -12.0
+        delays = 1e3 * response.delays[passed]
+        axes.plot(response.frequency[passed], delays, color=curve.colour, lw=1.6, label=curve.label)
+        _line(axes, 1e3 * curve.claim.delay, curve.claim.confidence)
+        spread = np.concatenate((spread, delays))
     low, high = claim.delay_limits or (0.9 * claim.delay, 1.1 * claim.delay)
     if claim.delay_limits is not None:
-        axes.axhspan(1e3 * low, 1e3 * high, color=_SHEET, alpha=0.1, lw=0, label="sheet, limits")
-    margin = 0.35 * (high - low)
-    spread = 1e3 * response.delays[passed]
+        axes.axhspan(1e3 * low, 1e3 * high, color=_SHEET, alpha=0.1, lw=0, label="sheet, any piece")
+    margin = 0.5 * (high - low)
     axes.set_ylim(
         min(1e3 * (low - margin), 0.98 * float(spread.min())), max(1e3 * (high + margin), 1.02 * float(spread.max()))
     )
-    text = f"{1e3 * response.delay:.3f} ms\nsheet: {1e3 * claim.delay:.3g} ms"
+    text = "\n".join(
+        f"{curve.axis}{1e3 * curve.response.delay:.3f} ms, sheet {1e3 * curve.claim.delay:.3f} ms" for curve in curves
+    )
     axes.text(0.03, 0.06, text, transform=axes.transAxes, fontsize=8.5, va="bottom")
     axes.set_xlim(left=0.0)
-    axes.set_xlabel("frequency (Hz)", labelpad=1)
-    axes.legend(loc="upper right")
+    axes.set_xlabel("frequency (Hz); dashed: sheet, at its clock", labelpad=1)
+    axes.legend(loc="upper right", ncols=4, handlelength=1.2, columnspacing=1.0)
 
 
 def _step(axes: Axes, drawn: _Drawn) -> None:
-    step, claim = drawn.found.step, drawn.found.claim
-    word = 1e3 * word_period(drawn.sensor, drawn.part)
-    axes.set_title("Step response")
-    axes.plot(1e3 * step.time, step.share, ".-", color=_MODEL, ms=4, lw=0.8, label="modelled, first shown by a word")
-    _marker(axes, 1e3 * claim.delay, 0.5, claim.confidence)
-    _note(axes, 1e3 * claim.delay, 0.5, f"delay {1e3 * claim.delay:.4g} ms", (8, -10))
+    step, claim = drawn.found.step, drawn.found.claims.x
+    word = 1e3 / float(drawn.found.word_rate[0])
+    late = 1e3 * claim.delay
+    axes.set_title("Step response of x")
+    axes.plot(1e3 * step.time, step.share, ".-", color=_MODEL, ms=4, lw=0.8, label="modelled, several steps overlaid")
+    _marker(axes, late, 0.5, claim.confidence)
+    _note(axes, late, 0.5, f"delay {late:.4g} ms", (8, -10))
     axes.text(0.97, 0.30, f"a word every {word:.4g} ms", transform=axes.transAxes, fontsize=8.5, ha="right")
     settled = 1e3 * float(step.time[np.flatnonzero(step.share > 0.999)[0]])
-    axes.set_xlim(0.0, max(1.25 * settled, 2.2e3 * claim.delay))
+    axes.set_xlim(0.0, max(1.25 * settled, 2.2 * late))
     axes.set_ylim(-0.08, 1.12)
     axes.set_xlabel("time since the step (ms)", labelpad=1)
     axes.legend(loc="upper left")

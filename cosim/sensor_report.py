@@ -15,8 +15,9 @@ from attitude_fmu.models.sensors.adxrs450_sheet import NULL_ACCURACY
 from attitude_fmu.models.sensors.datasheet import UNSURE, Choice, Datum, Origin, Tolerance, in_si
 
 from .bench import Array
-from .characteristics import PARTS, Estimate, Part, Setting
+from .characteristics import PARTS, Codes, Estimate, Part, Setting
 from .sensor_findings import Findings, SettingFound
+from .sheet_claims import Example
 from .workspace import whole_or_not
 
 Origins = Mapping[str, Origin]
@@ -26,6 +27,14 @@ _G = STANDARD_GRAVITY
 _WHITE, _INSTABILITY, _WALK = 0.03, 0.10, 0.10
 _CUTOFF, _DELAY = 0.01, 0.02
 _RMS, _NONLINEARITY = 0.05, 0.10
+_WIDE = 120
+"""Columns of a terminal that has room for sources."""
+
+SAME_CLOCK = 5e-4
+"""Share of its rate to which a piece's clock is found."""
+
+_NOTHING = 1e-3
+"""Of its limits: an error so small is that of a piece without it."""
 
 
 class Units(NamedTuple):
@@ -88,7 +97,7 @@ def _of_part(found: Findings, origins: Origins) -> list[Line]:
         *_registers(found, origins),
         *_errors(found, origins),
         *_temperature(found, origins),
-        *[line for one in found.settings for line in _setting(found.part, one)],
+        *[line for one in found.settings for line in _setting(found, one)],
     ]
 
 
@@ -106,6 +115,12 @@ def shown(value: float) -> str:
 
 def _listed(values: Sequence[float] | Array) -> str:
     return ", ".join(f"{value:.3g}" for value in np.ravel(values))
+
+
+def _of_axes(values: Sequence[float] | Array) -> str:
+    """The numbers of the axes, one where they are alike."""
+    told = [shown(float(value)) for value in values]
+    return ", ".join(told if len(set(told)) > 1 else told[:1])
 
 
 def _near(value: float, claim: float, share: float) -> bool:
@@ -181,11 +196,16 @@ def bounds(tolerance: Tolerance) -> tuple[float, float]:
     return in_si(tolerance.mean - reach, tolerance.unit), in_si(tolerance.mean + reach, tolerance.unit)
 
 
+def limits_name(tolerance: Tolerance) -> str:
+    """What `bounds` are: three standard deviations, or the sheet's limits."""
+    return "3 sigma" if tolerance.reading == "sigma" and 3.0 * tolerance.size < tolerance.limit else "limits"
+
+
 def _rule(tolerance: Tolerance) -> str:
-    return "within 3 sigma" if tolerance.reading == "sigma" and not math.isfinite(tolerance.limit) else "within limits"
+    return f"within {limits_name(tolerance)}"
 
 
-def _spread(
+def spread(
     part: Part, quantity: str, unit: tuple[str, float], values: Array, tolerance: Tolerance | None, text: str = ""
 ) -> Line:
     """A line about numbers that differ from piece to piece; values in SI."""
@@ -194,12 +214,11 @@ def _spread(
     if tolerance is None:
         return Line(part, quantity, name, "not given", modelled, "", None, "", "the sheet gives none", "")
     low, high = bounds(tolerance)
-    agrees = bool(np.all((values >= low * (1.0 + 1e-6) - 1e-12) & (values <= high * (1.0 + 1e-6) + 1e-12)))
-    agrees = agrees or bool(np.max(np.abs(values)) <= 1e-3 * max(abs(low), abs(high)))
-    sheet = f"{shown(low / size)} to {shown(high / size)}"
-    return Line(
-        part, quantity, name, sheet, modelled, "", agrees, _rule(tolerance), tolerance.source, tolerance.confidence
-    )
+    sheet, rule = f"{shown(low / size)} to {shown(high / size)}", _rule(tolerance)
+    agrees: bool | None = bool(np.all((values >= low) & (values <= high)))
+    if float(np.max(np.abs(values))) <= _NOTHING * max(abs(low), abs(high)):
+        agrees, rule = None, "nominal: it has none"
+    return Line(part, quantity, name, sheet, modelled, "", agrees, rule, tolerance.source, tolerance.confidence)
 
 
 # --- the lines -------------------------------------------------------------------------------------------------------
@@ -207,7 +226,7 @@ def _spread(
 
 def _noise(found: Findings, origins: Origins) -> list[Line]:
     part, units = found.part, UNITS[found.part]
-    density = _datum(origins, f"{part}.noise_density")
+    density = _density(found, origins)
     instability = _datum(origins, f"{part}.bias_instability")
     walk = _datum(origins, f"{part}.rate_random_walk")
     floor = floor_of(instability) if instability is not None and _is_given(instability) else None
@@ -219,10 +238,11 @@ def _noise(found: Findings, origins: Origins) -> list[Line]:
         ),
         _estimated(part, "rate random walk", units.walk, _as_walk(found.walk), step, _WALK, walk),
     ]
-    if density is not None:
+    datum = _datum(origins, f"{part}.noise_density")
+    if datum is not None:
         name, size = units.reading
-        bandwidth = found.claim.noise_bandwidth * found.clock
-        claim = density.si * math.sqrt(bandwidth)
+        bandwidth = float(np.mean([claim.noise_bandwidth for claim in found.claims.own]))
+        claim = datum.si * math.sqrt(bandwidth)
         told.append(
             Line(
                 part,
@@ -234,10 +254,47 @@ def _noise(found: Findings, origins: Origins) -> list[Line]:
                 _near(found.noise_rms, claim, _RMS),
                 f"±{_RMS:.0%}",
                 f"density and {bandwidth:.4g} Hz of noise bandwidth at this piece's clock",
-                "calculated" if density.confidence not in UNSURE else density.confidence,
+                _calculated(datum),
             )
         )
-    return told
+    walk_line = _random_walk(found)
+    return told if walk_line is None else [*told[:1], walk_line, *told[1:]]
+
+
+def _calculated(datum: Datum) -> str:
+    """How sure what follows from a number is."""
+    return datum.confidence if datum.confidence in UNSURE else "calculated"
+
+
+def _density(found: Findings, origins: Origins) -> Datum | None:
+    """The sheet's density as the words show it: conversions that a divider leaves out fold their noise down."""
+    datum, gain = _datum(origins, f"{found.part}.noise_density"), found.claims.nominal.density_gain
+    if datum is None or gain == 1.0:
+        return datum
+    source = f"{datum.source}: {datum.text} by √{gain**2:g}, folded by the divider"
+    return datum._replace(value=datum.value * gain, source=source, confidence=_calculated(datum))
+
+
+def _random_walk(found: Findings) -> Line | None:
+    """N = D/sqrt(2) of the density as found, beside a random walk that the sheet prints and its density contradicts."""
+    printed = found.sheet.random_walk
+    if printed is None:
+        return None
+    is_gyro = found.part == "gyro"
+    density = found.white.value / found.claims.nominal.density_gain
+    value = density / math.sqrt(2.0) * 60.0 * (1.0 / _DEGREE if is_gyro else 1e3)
+    return Line(
+        found.part,
+        "angle random walk" if is_gyro else "velocity random walk",
+        "°/√h" if is_gyro else "mm/s/√h",
+        printed.printed,
+        shown(value),
+        "",
+        None,
+        "contradicts the density",
+        f"{printed.source}: {printed.why}",
+        printed.confidence,
+    )
 
 
 def _as_walk(found: Estimate | None) -> Estimate | None:
@@ -246,14 +303,16 @@ def _as_walk(found: Estimate | None) -> Estimate | None:
 
 
 def _filter(found: Findings) -> list[Line]:
-    told = _setting(found.part, SettingFound(Setting("", {}), found.claim, found.response))
-    claim, half = found.claim, found.step.half
+    told = _setting(found, SettingFound(Setting("", {}), found.claims, found.responses))
+    claim, half = found.claims.nominal, found.step.half
+    if claim.delay_limits is not None:
+        told.append(_delay_within_limits(found, claim.delay_limits))
     told.append(
         Line(
             found.part,
-            "step, half way after",
+            "step of x, half way after",
             "ms",
-            shown(1e3 * claim.delay),
+            shown(1e3 * found.claims.x.delay),
             shown(1e3 * half),
             "",
             None,
@@ -270,41 +329,57 @@ def cutoff_name(decibels: float) -> str:
     return f"{decibels:.2f} dB frequency".replace("-3.01", "-3")
 
 
-def _setting(part: Part, one: SettingFound) -> list[Line]:
-    claim, response = one.claim, one.response
+def _setting(found: Findings, one: SettingFound) -> list[Line]:
+    """-3 dB frequency and delay of the axes, beside the sheet's at the clocks that they were found to have."""
+    claim, clocks = one.claims.nominal, found.clocks
     at = f"{_setting_name(one.setting.label)}: " if one.setting.label else ""
-    frequency = response.frequency_of(claim.decibels)
-    named = cutoff_name(claim.decibels)
-    limits = claim.delay_limits
-    sheet = shown(1e3 * claim.delay)
-    if limits is not None:
-        sheet += f" ({shown(1e3 * limits[0])} to {shown(1e3 * limits[1])})"
-    return [
-        Line(
-            part,
-            f"{at}{named}",
-            "Hz",
-            shown(claim.frequency),
-            shown(frequency) if math.isfinite(frequency) else "none",
-            "",
-            _near(frequency, claim.frequency, _CUTOFF),
-            f"±{_CUTOFF:.0%}",
-            claim.source,
-            claim.confidence,
-        ),
-        Line(
-            part,
-            f"{at}delay",
-            "ms",
-            sheet,
-            shown(1e3 * response.delay),
-            "",
-            _near(response.delay, claim.delay, _DELAY),
-            f"±{_DELAY:.0%}",
-            claim.source,
-            claim.confidence,
-        ),
-    ]
+    frequencies = np.array([response.frequency_of(claim.decibels) for response in one.responses])
+    delays = np.array([response.delay for response in one.responses])
+    at_its_clock = "" if np.allclose(clocks, 1.0, rtol=0.0, atol=SAME_CLOCK) else ", at its clock"
+    told = []
+    own_frequencies = np.array([own.frequency for own in one.claims.own])
+    own_delays = np.array([own.delay for own in one.claims.own])
+    for quantity, unit, size, nominal, claims, values, share in (
+        (cutoff_name(claim.decibels), "Hz", 1.0, claim.frequency, own_frequencies, frequencies, _CUTOFF),
+        ("delay", "ms", 1e-3, claim.delay, own_delays, delays, _DELAY),
+    ):
+        source = f"{claim.source}: {shown(nominal / size)} {unit}" if at_its_clock else claim.source
+        told.append(
+            Line(
+                found.part,
+                f"{at}{quantity}",
+                unit,
+                _of_axes(claims / size) if at_its_clock else shown(nominal / size),
+                _of_axes(values / size),
+                "",
+                _all_near(values, claims, share),
+                f"±{share:.0%}{at_its_clock}",
+                source,
+                claim.confidence,
+            )
+        )
+    return told
+
+
+def _all_near(values: Array, claims: Array, share: float) -> bool:
+    """Whether each number is near its claim, or there is neither."""
+    return bool(np.allclose(values, claims, rtol=share, atol=0.0, equal_nan=True))
+
+
+def _delay_within_limits(found: Findings, limits: tuple[float, float]) -> Line:
+    delays = np.array([response.delay for response in found.responses])
+    return Line(
+        found.part,
+        "delay, of any piece",
+        "ms",
+        f"{shown(1e3 * limits[0])} to {shown(1e3 * limits[1])}",
+        _of_axes(1e3 * delays),
+        "",
+        bool(np.all((delays >= limits[0]) & (delays <= limits[1]))),
+        "within limits",
+        found.claims.nominal.source,
+        found.claims.nominal.confidence,
+    )
 
 
 def _setting_name(label: str) -> str:
@@ -312,48 +387,40 @@ def _setting_name(label: str) -> str:
 
 
 def _registers(found: Findings, origins: Origins) -> list[Line]:
-    part = found.part
-    resolution, limit = _datum(origins, f"{part}.resolution"), _datum(origins, f"{part}.code_limit")
-    exact = int(np.sum(found.codes.codes == found.expected_codes[:, None]))
-    told = []
-    if resolution is not None and limit is not None:
-        told.append(
-            Line(
-                part,
-                "register codes of known inputs",
-                "LSB",
-                f"{resolution.text}, {limit.text}",
-                f"{exact} of {found.codes.codes.size} exact",
-                "",
-                exact == found.codes.codes.size,
-                "exact",
-                resolution.source,
-                resolution.confidence,
-            )
-        )
-    thermometer = _thermometer(found, origins)
     rate = _word_rate(found, origins)
-    return [*told, *([] if thermometer is None else [thermometer]), *([] if rate is None else [rate])]
+    sheet = found.sheet
+    told = [
+        _codes(found.part, "register codes of known inputs", found.codes, sheet.codes, sheet.codes_source, origins),
+        _codes(
+            found.part,
+            "thermometer codes",
+            found.thermometer,
+            sheet.thermometer,
+            sheet.thermometer_source,
+            origins,
+        ),
+    ]
+    return told if rate is None else [*told, rate]
 
 
-def _thermometer(found: Findings, origins: Origins) -> Line | None:
-    part, codes = found.part, found.thermometer
-    slope, zero = (_datum(origins, f"{part}.thermometer.{name}") for name in ("sensitivity", "code_at_25"))
-    if slope is None or zero is None:
-        return None
-    expected = np.floor(zero.si + slope.si * (codes.given - 25.0) + 0.5)
-    exact = int(np.sum(codes.codes == expected))
+def _codes(part: Part, quantity: str, found: Codes, examples: Sequence[Example], source: str, origins: Origins) -> Line:
+    """The codes of the sheet's examples; as sure as what the sheet says of the register."""
+    expected = np.array([example.code for example in examples])
+    exact = int(np.sum(expected == found.codes.T))
+    name = "thermometer.sensitivity" if quantity.startswith("thermometer") else "resolution"
+    datum = _datum(origins, f"{part}.{name}")
+    given = ", ".join(f"{example.given:g}: {example.code}" for example in examples[:2])
     return Line(
         part,
-        "thermometer codes, -40 to 85 °C",
+        quantity,
         "LSB",
-        f"{slope.text}, {zero.text} at 25 °C",
-        f"{exact} of {len(expected)} exact",
+        given,
+        f"{exact} of {found.codes.size} exact",
         "",
-        exact == len(expected),
+        exact == found.codes.size,
         "exact",
-        slope.source,
-        slope.confidence,
+        source,
+        "" if datum is None else datum.confidence,
     )
 
 
@@ -362,7 +429,7 @@ def _word_rate(found: Findings, origins: Origins) -> Line | None:
     tolerance = _tolerance(origins, f"{part}.clock_error" + ("[1]" if part == "gyro" else ""))
     if tolerance is None:
         return None
-    nominal = found.at_rest.rate
+    nominal = found.claims.nominal.word_rate
     low, high = (nominal * (1.0 + bound) for bound in bounds(tolerance))
     rates = found.word_rate if part == "gyro" else found.word_rate[:1]
     return Line(
@@ -385,9 +452,9 @@ def _errors(found: Findings, origins: Origins) -> list[Line]:
     own = np.diag(measured.matrix) - 1.0
     across = measured.matrix - np.diag(np.diag(measured.matrix))
     told = [
-        _spread(part, "offset at 25 °C", units.reading, measured.offset, _tolerance(origins, f"{part}.bias[1]")),
-        _spread(part, "scale error", percent, own, _tolerance(origins, f"{part}.scale_error[1]")),
-        _spread(
+        spread(part, "offset at 25 °C", units.reading, measured.offset, _tolerance(origins, f"{part}.bias[1]")),
+        spread(part, "scale error", percent, own, _tolerance(origins, f"{part}.scale_error[1]")),
+        spread(
             part,
             "cross-axis",
             percent,
@@ -433,7 +500,7 @@ def _pushed(found: Findings, origins: Origins) -> list[Line]:
     by_g, by_square = ("°/s/g", _DEGREE / _G), ("°/s/g²", _DEGREE / _G**2)
     largest = float(np.max(np.abs(measured.g_sensitivity))) / by_g[1]
     told = [
-        _spread(
+        spread(
             "gyro",
             "sensitivity to acceleration",
             by_g,
@@ -466,14 +533,14 @@ def _pushed(found: Findings, origins: Origins) -> list[Line]:
 def _temperature(found: Findings, origins: Origins) -> list[Line]:
     part, units, drift = found.part, UNITS[found.part], found.drift
     told = [
-        _spread(
+        spread(
             part,
             "offset by temperature",
             units.slope,
             drift.slope(drift.offset),
             _tolerance(origins, f"{part}.bias_temperature_slope[1]"),
         ),
-        _spread(
+        spread(
             part,
             "scale by temperature",
             ("ppm/°C", 1e-6),
@@ -481,6 +548,23 @@ def _temperature(found: Findings, origins: Origins) -> list[Line]:
             _tolerance(origins, f"{part}.scale_temperature_slope[1]"),
         ),
     ]
+    hysteresis = 0.5 * np.max(np.abs(drift.hysteresis), axis=0)
+    if np.max(hysteresis) > _NOTHING * np.max(np.abs(drift.offset)):
+        name, size = units.reading
+        told.append(
+            Line(
+                part,
+                "hysteresis of the offset, ±",
+                name,
+                "not given",
+                _listed(hysteresis / size),
+                "",
+                None,
+                "",
+                "the sheet gives none",
+                "",
+            )
+        )
     if part == "gyro" and _is_adxrs450(origins):
         name, size = units.reading
         worst = float(np.max(np.abs(drift.offset)))
@@ -514,17 +598,17 @@ def unsure_mark(confidence: str) -> str:
     return " ?" if confidence in UNSURE else ""
 
 
-def summary(told: Sequence[Line]) -> str:
-    """How many lines agree."""
-    judged = [line for line in told if line.agrees is not None]
+def summary(told: Sequence[Line], part: Part | None = None) -> str:
+    """How many of the lines with a verdict, of one part or of both, agree."""
+    judged = [line for line in told if line.agrees is not None and part in (None, line.part)]
     agreeing = sum(line.agrees is True for line in judged)
     unsure = sum(line.confidence in UNSURE for line in judged)
     text = f"{agreeing} of {len(judged)} numbers agree with the datasheet"
     return f"{text}; {unsure} of the datasheet's are unsure" if unsure else text
 
 
-def table(told: Sequence[Line], title: str) -> Any:
-    """The lines as a rich table."""
+def table(told: Sequence[Line], title: str, width: int) -> Any:
+    """The lines as a rich table for so many columns of text; where they are few, rules and sources stay in the file."""
     from rich.table import Table
     from rich.text import Text
 
@@ -535,8 +619,10 @@ def table(told: Sequence[Line], title: str) -> Any:
     drawn.add_column("datasheet", justify="right", overflow="fold")
     drawn.add_column("modelled", justify="right", overflow="fold")
     drawn.add_column("", no_wrap=True)
-    drawn.add_column("rule", style="dim", overflow="fold")
-    drawn.add_column("source", style="dim", overflow="fold")
+    is_wide = width >= _WIDE
+    if is_wide:
+        drawn.add_column("rule", style="dim", overflow="fold")
+        drawn.add_column("source", style="dim", overflow="fold")
     for part in PARTS:
         drawn.add_section()
         drawn.add_row(Text(part, style="bold"))
@@ -545,15 +631,14 @@ def table(told: Sequence[Line], title: str) -> Any:
                 continue
             modelled = f"{line.modelled} [{line.interval}]" if line.interval else line.modelled
             style = {True: "green", False: "bold red", None: "dim"}[line.agrees]
-            drawn.add_row(
+            cells: list[Any] = [
                 line.quantity,
                 line.unit,
                 line.sheet + unsure_mark(line.confidence),
                 Text(modelled),
                 Text(line.verdict, style=style),
-                line.rule,
-                line.source,
-            )
+            ]
+            drawn.add_row(*cells, *([line.rule, line.source] if is_wide else []))
     return drawn
 
 

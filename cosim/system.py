@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from .errors import SystemRefusedError, did_you_mean
+from attitude_fmu.fmu_src.errors import did_you_mean
+
+from .errors import SystemRefusedError
 from .interface import Interface, Unit, Value, Variable, read_interface
 
 _WHOLE = {"Integer", "Boolean", "Enumeration"}

@@ -74,6 +74,8 @@ def whole_or_not(path: Path) -> Iterator[Path]:
 
     Raises `ResultsError` if the disk does not take it.
     """
+    if not path.name or path.is_dir():
+        raise ResultsError(f"cannot write {path}: it is a folder; name a file")
     draft = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         yield draft

@@ -15,10 +15,10 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 from xml.etree import ElementTree
 
-from .catalogue import CATALOGUE, Entry, Kind, with_device
+from .catalogue import CATALOGUE, Entry, Kind, with_device, with_values
 from .catalogue import entry as entry_called
 from .errors import BuildError
 from .native.compile import PLATFORMS, host_platform
@@ -56,14 +56,14 @@ def _quiet(_identifier: str, _event: str) -> None:
 
 
 def _entry(
-    which: str | Entry, device: str | None = None, specimen: int = 0, values: Mapping[str, float] | None = None
+    which: str | Entry, device: str | None = None, specimen: int = 0, values: Mapping[str, Any] | None = None
 ) -> Entry:
     entry = entry_called(which) if isinstance(which, str) else which
     if device is not None:
-        return with_device(entry, device, specimen, values)
-    if specimen:
+        entry = with_device(entry, device, specimen)
+    elif specimen:
         raise BuildError(f"specimen {specimen} of which device? Name one, such as {entry.device or 'AttitudeSensor'}")
-    return entry._replace(starts=tuple({**dict(entry.starts), **values}.items())) if values else entry
+    return with_values(entry, values) if values else entry
 
 
 def folder_of(dist: Path, kind: Kind) -> Path:
@@ -112,12 +112,12 @@ def build(
     *,
     device: str | None = None,
     specimen: int = 0,
-    values: Mapping[str, float] | None = None,
+    values: Mapping[str, Any] | None = None,
 ) -> Path:
     """Build one FMU into the folder `dist`; a file of the same name is replaced whole or not at all.
 
     A sensor starts with the parameters of a `device` and of one `specimen` of it, if named (`with_device`), and any
-    model with other `values`.
+    model with other `values`, which also change the file's name (`with_values`).
     """
     entry = _entry(which, device, specimen, values)
     folder = folder_of(dist, kind)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
+import json
 from collections.abc import Mapping
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from ..models.record import check, defaults, flatten, with_defaults
+from ..models.record import Boolean, Enumeration, Fact, allowed, check, defaults, flatten, leaves, with_defaults
 from ..models.sensors.devices import DEFAULT, DEVICES, UnknownDeviceError, parameters
 from ..models.system import Model, check_rules
-from .errors import BuildError
+from .errors import BuildError, did_you_mean
 
 Kind = Literal["native", "python"]
 """Compiled C, or Python sources run by pythonfmu; variables and value references are the same."""
@@ -70,8 +72,8 @@ CATALOGUE = (
 )
 
 
-def with_device(entry: Entry, device: str, specimen: int = 0, values: Mapping[str, float] | None = None) -> Entry:
-    """The entry with the parameters of a device, and of one piece of it, as start values; `values` win over them.
+def with_device(entry: Entry, device: str, specimen: int = 0) -> Entry:
+    """The entry with the parameters of a device, and of one piece of it, as start values.
 
     It is called after both, ``AttitudeSensor_ADIS16354_150_specimen_3``: file, modelIdentifier and binaries, so that
     several of them can lie in a folder and run in a process.
@@ -79,14 +81,25 @@ def with_device(entry: Entry, device: str, specimen: int = 0, values: Mapping[st
     if not entry.device:
         raise BuildError(f"{entry.identifier} is no sensor, it cannot be a {device}")
     try:
-        starts = {**parameters(device, specimen), **(values or {})}
+        starts = parameters(device, specimen)
     except UnknownDeviceError as error:
-        raise BuildError(str(error)) from None
+        raise BuildError(f"{error}{'' if device in DEVICES else did_you_mean(device.upper(), DEVICES)}") from None
     suffix = f"_specimen_{specimen}" if specimen else ""
     about = f"{_piece(specimen)} of {device}: {DEVICES[device].description}. {entry.about}"
     return entry._replace(
         identifier=f"{entry.identifier}_{device}{suffix}", about=about, device=device, starts=tuple(starts.items())
     )
+
+
+def with_values(entry: Entry, values: Mapping[str, Any]) -> Entry:
+    """The entry with these start values as well: numbers, true or false, or names of choices.
+
+    Eight digits of their digest end its name, so that other values make another file and do not replace it.
+    """
+    numbers = _numbers(entry, values)
+    digest = hashlib.sha256(json.dumps(sorted(numbers.items())).encode()).hexdigest()[:8]
+    starts = {**dict(entry.starts), **numbers}
+    return entry._replace(identifier=f"{entry.identifier}_{digest}", starts=tuple(starts.items()))
 
 
 def _piece(specimen: int) -> str:
@@ -119,15 +132,32 @@ def _written(entry: Entry) -> Model:
     return model
 
 
+def _numbers(entry: Entry, values: Mapping[str, Any]) -> dict[str, float]:
+    """Values of the model's parameters as numbers."""
+    facts = {leaf.name: leaf.fact for leaf in leaves(_written(entry).Parameters)}
+    found = {}
+    for name, value in values.items():
+        if name not in facts:
+            raise BuildError(f"{entry.identifier} has no parameter {name!r}{did_you_mean(name, facts)}")
+        found[name] = _number(f"{entry.identifier}.{name}", value, facts[name])
+    return found
+
+
+def _number(where: str, value: Any, fact: Fact) -> float:
+    if isinstance(fact, Enumeration) and value in [item.name for item in fact.items]:
+        return fact.value(value)
+    if isinstance(value, str) or not hasattr(value, "__float__"):
+        kind = "choice" if isinstance(fact, Enumeration) else "switch" if isinstance(fact, Boolean) else "number"
+        raise BuildError(f"{where} = {value!r}: not a {kind} (allowed: {allowed(fact)})")
+    return float(value) if not isinstance(value, int) else int(value)
+
+
 def model_of(entry: Entry) -> Model:
     """The model of an entry, with the entry's start values."""
     model = _written(entry)
     if not entry.starts:
         return model
-    try:
-        started = model._replace(Parameters=with_defaults(model.Parameters, dict(entry.starts)))
-    except KeyError as error:
-        raise BuildError(f"{entry.identifier} has no parameter {error}") from None
+    started = model._replace(Parameters=with_defaults(model.Parameters, _numbers(entry, dict(entry.starts))))
     if entry.device:
         parts = DEVICES[entry.device].description
         started = started._replace(description=f"Six-axis MEMS attitude sensor: {parts}, filters and attitude solver")

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 
 from ..models.record import Boolean, Enumeration, Real, allowed
-from ..models.sensors.datasheet import CONFIDENCE, READINGS, UNSURE, Origin, Tolerance
+from ..models.sensors.datasheet import CONFIDENCE, READINGS, UNSURE, Origin, differs_from_piece_to_piece
 from ..models.sensors.devices import DEVICES, origins, parameters
 from ..models.system import Model
 from .catalogue import Entry, Kind
@@ -170,11 +170,11 @@ _UNSURE_MARK = "(?)"
 
 
 def _source(variable: Variable, origin: Origin, nominal: float) -> str:
-    is_piece = isinstance(origin, Tolerance)
-    if not is_piece and variable.start != nominal:
+    is_own = variable.start != nominal
+    if is_own and not differs_from_piece_to_piece(origin):
         return "chosen when this FMU was built"
     mark = f"{_UNSURE_MARK} " if origin.confidence in UNSURE else ""
-    number = f"this piece's; all pieces: {origin.text}" if is_piece and variable.start else origin.text
+    number = f"this piece's; all pieces: {origin.text}" if is_own else origin.text
     return f"{mark}{number}: {origin.source} [{origin.confidence}]"
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 from ..models.errors import AttitudeFmuError
 
 
@@ -15,3 +18,9 @@ class BuildError(AttitudeFmuError, RuntimeError):
 
 class CallRefusedError(AttitudeFmuError, RuntimeError):
     """A call that FMI or the instance's state does not allow."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """A hint that names what is spelt like `name`, or nothing."""
+    close = get_close_matches(name, list(known), n=3, cutoff=0.6)
+    return f"; did you mean {' or '.join(close)}?" if close else ""

@@ -7,6 +7,7 @@ the parts' registers by its timer, aligns at rest, solves the attitude and filte
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from typing import Annotated, Any, NamedTuple
 
 from .attitude.alignment import (
@@ -29,30 +30,40 @@ from .attitude.rotations import (
     matrix_from_euler,
     matrix_from_quaternion,
 )
-from .attitude.velocity_aided import Fused, FusionParameters, FusionState, RestState, fused_step, initial_fusion
+from .attitude.velocity_aided import (
+    Fused,
+    FusionParameters,
+    FusionState,
+    RestState,
+    corrected,
+    initial_fusion,
+    is_held,
+    with_rest,
+)
 from .filters.ar1_kalman import Ar1KalmanParameters, Ar1KalmanState, ar1_kalman_step, initial_ar1_kalman
 from .filters.kalman import KalmanParameters, kalman_filtered
 from .filters.rc import RcParameters, rc_filtered
 from .record import Boolean, Enumeration, Integer, Item, Matrix3, Quaternion, Real, Vector3, choose
-from .scalar import PI, Scalar, both, floor, maximum, minimum, sqrt, where
+from .scalar import PI, Scalar, both, either, maximum, minimum, sqrt, where
 from .sensors import accelerometer as accelerometers
 from .sensors import adis16354_words as adis16354
-from .sensors import adxl355_registers as adxl355
-from .sensors import adxrs450_frame as adxrs450
-from .sensors import bias_instability
+from .sensors import bias_instability, exchange
 from .sensors import gyro as gyros
 from .sensors.accelerometer import (
     ACCELEROMETER_FILTER,
     AccelerometerCoefficients,
     AccelerometerParameters,
     AccelerometerState,
+    RegisterWords,
+    registers,
 )
 from .sensors.board import BOARD
 from .sensors.datasheet import REFERENCE_TEMPERATURE
 from .sensors.digital_filter import TAPS, DelayLines
+from .sensors.exchange import Answering, Exchange, Received
 from .sensors.faults import LOST_FRAMES, FaultParameters, is_active
 from .sensors.gyro import GYRO_FILTER, GyroCoefficients, GyroParameters, GyroState
-from .sensors.sensitivity import hysteresis_loop, hysteresis_offset, with_temperature
+from .sensors.sensitivity import hysteresis_loop, hysteresis_offset, straightened, with_temperature
 from .sensors.thermal import (
     HeaterParameters,
     HeaterState,
@@ -71,7 +82,7 @@ _MOST_COUNTED = 2.0**31 - 1.0
 """Largest count that an FMI integer holds."""
 
 SLOW_PERIOD = 0.1
-"""s between steps of temperature and bias instability."""
+"""s between steps of temperature and bias instability, whose shortest time constant it is: assumption."""
 
 SOLVER = Enumeration(
     "Solver",
@@ -112,7 +123,9 @@ class MountingParameters(NamedTuple):
     """Where the sensor sits on the body; its attitude is that of its own axes."""
 
     rotation: Euler = Euler(0.0, 0.0, 0.0)
-    lever_arm: Annotated[Vector3, Real("m", "accelerometer from where the specific force is given, body axes")] = ZERO3
+    lever_arm: Annotated[
+        Vector3, Real("m", "accelerometer alone, the gyros not, from where the specific force is given, body axes")
+    ] = ZERO3
 
 
 class ProcessorParameters(NamedTuple):
@@ -131,14 +144,18 @@ class SupplyParameters(NamedTuple):
 
 
 class CompensationParameters(NamedTuple):
-    """What the processor takes out of the readings, with the parts' own thermometers: M (y - b - G f).
+    """What the processor takes out of the readings, with the parts' own thermometers: M diag(s)^-1 v.
 
-    b = b0 + b1 (T - 25 degC) + b2 (T - 25 degC)^2.
+    v + c v^3 = y - b - G f,  b = b0 + b1 (T - 25 degC) + b2 (T - 25 degC)^2,  s = 1 + k (T - 25 degC).
     """
 
     gyro_bias: Annotated[Vector3, Real("rad/s", "gyro bias taken out", display="deg/s")] = ZERO3
     gyro_bias_temperature_slope: Annotated[Vector3, Real("rad/(s.K)", "its change with temperature")] = ZERO3
     gyro_bias_temperature_curve: Annotated[Vector3, Real("rad/(s.K2)", "its change with temperature squared")] = ZERO3
+    gyro_scale_temperature_slope: Annotated[
+        Vector3, Real("1/K", "relative change of the gyros' sensitivity with temperature", min=-1e-3, max=1e-3)
+    ] = ZERO3
+    gyro_cubic: Annotated[Vector3, Real("s2/rad2", "what bends the gyros' line by its cube", min=-1.0, max=1.0)] = ZERO3
     gyro_matrix: Annotated[Matrix3, Real("1", "what the gyro readings are multiplied by")] = IDENTITY3
     g_sensitivity: Annotated[Matrix3, Real("rad.s/m", "gyro reading by specific force taken out")] = _NOTHING
     accelerometer_bias: Annotated[Vector3, Real("m/s2", "accelerometer bias taken out")] = ZERO3
@@ -147,6 +164,12 @@ class CompensationParameters(NamedTuple):
     ] = ZERO3
     accelerometer_bias_temperature_curve: Annotated[
         Vector3, Real("m/(s2.K2)", "change of the accelerometer bias with temperature squared")
+    ] = ZERO3
+    accelerometer_scale_temperature_slope: Annotated[
+        Vector3, Real("1/K", "relative change of the accelerometer's sensitivity with temperature", min=-1e-3, max=1e-3)
+    ] = ZERO3
+    accelerometer_cubic: Annotated[
+        Vector3, Real("s4/m2", "what bends the accelerometer's line by its cube", min=-1e-3, max=1e-3)
     ] = ZERO3
     accelerometer_matrix: Annotated[Matrix3, Real("1", "what the accelerometer readings are multiplied by")] = IDENTITY3
 
@@ -172,7 +195,7 @@ class SolverParameters(NamedTuple):
     """The attitude solution."""
 
     kind: Annotated[int, SOLVER] = SOLVER.value("fused")
-    integration: Annotated[int, INTEGRATION] = INTEGRATION.value("runge_kutta_4")
+    integration: Annotated[int, INTEGRATION] = INTEGRATION.value("mean_rate")
     fusion: FusionParameters = FusionParameters()
 
 
@@ -271,12 +294,13 @@ class SlowState(NamedTuple):
 
 
 class ReadingState(NamedTuple):
-    """What the processor read last."""
+    """What the processor read last; a lost word leaves its channel as it was."""
 
     rate: Annotated[Vector3, Real("rad/s", "rate as read", display="deg/s")]
     specific_force: Annotated[Vector3, Real("m/s2", "specific force as read")]
     gyro_words: Annotated[Vector3, Real("1", "gyro words until the last reading")]
-    accelerometer_words: Annotated[float, Real("1", "accelerometer words until the last reading")]
+    accelerometer_words: Annotated[Vector3, Real("1", "accelerometer words until the last reading")]
+    received: Received
     repeated: Annotated[float, Integer("words that were read more than once")]
     missed: Annotated[float, Integer("words that were never read")]
     readings: Annotated[float, Real("1", "readings so far")]
@@ -316,23 +340,23 @@ class State(NamedTuple):
 
 
 class RegisterOutputs(NamedTuple):
-    """Codes in the parts' registers, and the words that carry them to the processor."""
+    """Codes in the parts' registers as they are now, and the words in which the processor received them last."""
 
     rate: Annotated[Vector3, Integer("RATE registers of the three gyros")]
     acceleration: Annotated[Vector3, Integer("XDATA, YDATA, ZDATA of the accelerometer")]
-    gyro_temperature: Annotated[float, Integer("code of the gyros' thermometer")]
+    gyro_temperature: Annotated[float, Integer("code of the gyros' thermometer; simplified: one for all three")]
     accelerometer_temperature: Annotated[float, Integer("code of the accelerometer's thermometer")]
     gyro_word: Annotated[
-        Vector3, Integer("what a read of the gyro answers: ADXRS450 32-bit response as signed, ADIS16354 16-bit word")
+        Vector3, Integer("as last received from the gyro: ADXRS450 32-bit response as signed, ADIS16354 16-bit word")
     ]
     accelerometer_word: Annotated[
-        Vector3, Integer("what a read of the accelerometer answers: ADXL355 24-bit, ADIS16354 16-bit word")
+        Vector3, Integer("as last received from the accelerometer: ADXL355 24-bit, ADIS16354 16-bit word")
     ]
-    status_word: Annotated[float, Integer("STATUS of an ADIS16354, 0 for the other parts")]
+    status_word: Annotated[float, Integer("STATUS of an ADIS16354 as last received, 0 for the other parts")]
 
 
 class SampleOutputs(NamedTuple):
-    """What the beat between the parts' clocks and the processor's does, counted over all parts."""
+    """What the beat between the parts' clocks and the processor's does, counted over all six channels."""
 
     repeated: Annotated[float, Integer("words that the processor read more than once")]
     missed: Annotated[float, Integer("words that the processor never read")]
@@ -440,15 +464,22 @@ def initial_state(p: Parameters, k: Coefficients, inputs: Inputs) -> State:
     force = _force_at_part(inputs, p)
     gyro = each_axis(
         lambda axis: gyros.initial_gyro(
-            axis, inputs.rate, force, slow.gyro_offset[axis], slow.gyro_scale[axis], p.gyro, k.gyro
+            axis, inputs.rate, inputs.specific_force, slow.gyro_offset[axis], slow.gyro_scale[axis], p.gyro, k.gyro
         )
     )
     part, part_lines = accelerometers.initial_accelerometer(
         force, slow.accelerometer_offset, slow.accelerometer_scale, p.accelerometer, k.accelerometer
     )
     states = (gyro[0][0], gyro[1][0], gyro[2][0])
-    read = _read(states, part, slow, inputs, p, k)
-    reading = ReadingState(read.rate, read.specific_force, ZERO3, 0.0, 0.0, 0.0, 0.0)
+    words = part.latest
+    read = _read(states, words, slow, inputs, p, k)
+    now = _exchange(0.0, _ALL_NEW, _ALL_NEW, slow, p)
+    received = choose(
+        p.gyro.filter == _CIC,
+        exchange.of_adxrs450_and_adxl355(states, words, now),
+        exchange.of_adis16354(states, words, now),
+    )
+    reading = ReadingState(read.rate, read.specific_force, ZERO3, ZERO3, received, 0.0, 0.0, 0.0)
     q_nb = levelled(reading.specific_force, inputs.heading_aid)
     euler = euler_from_matrix(matrix_from_quaternion(q_nb))
     filtered = Euler(*[where(p.filter.from_zero > 0.5, 0.0, angle) for angle in euler])
@@ -650,15 +681,24 @@ def _compensated(rate: Vector3, force: Vector3, slow: SlowState, p: Parameters) 
         slope, curve = c.gyro_bias_temperature_slope[i], c.gyro_bias_temperature_curve[i]
         return with_temperature(c.gyro_bias[i], slope, curve, gyro_temperature)
 
-    true_force = multiply(c.accelerometer_matrix, subtract(force, each_axis(part_bias)))
-    pushed = multiply(c.g_sensitivity, true_force)
-    true_rate = multiply(c.gyro_matrix, subtract(subtract(rate, each_axis(gyro_bias)), pushed))
+    unbiased = subtract(force, each_axis(part_bias))
+    straight = each_axis(lambda i: straightened(unbiased[i], c.accelerometer_cubic[i]))
+    scaled = _at_reference_scale(straight, c.accelerometer_scale_temperature_slope, part_temperature)
+    true_force = multiply(c.accelerometer_matrix, scaled)
+    unmoved = subtract(subtract(rate, each_axis(gyro_bias)), multiply(c.g_sensitivity, true_force))
+    turning = each_axis(lambda i: straightened(unmoved[i], c.gyro_cubic[i]))
+    true_rate = multiply(c.gyro_matrix, _at_reference_scale(turning, c.gyro_scale_temperature_slope, gyro_temperature))
     return _Read(true_rate, true_force)
+
+
+def _at_reference_scale(reading: Vector3, slope: Vector3, temperature: Scalar) -> Vector3:
+    """diag(1 + k (T - 25 degC))^-1 y; what a thermometer of no use reads is kept from the division."""
+    return each_axis(lambda i: reading[i] / maximum(1.0 + slope[i] * (temperature - REFERENCE_TEMPERATURE), 0.5))
 
 
 def _read(
     gyro: tuple[GyroState, GyroState, GyroState],
-    part: AccelerometerState,
+    part: RegisterWords,
     slow: SlowState,
     inputs: Inputs,
     p: Parameters,
@@ -675,42 +715,74 @@ def _read(
     )
 
 
-def _lost(channel: int, p: Parameters, time: Scalar) -> Scalar:
-    """1.0 where the word of a channel does not reach the processor."""
-    lost: Scalar = 0.0
-    for fault in p.fault:
-        gone = both(fault.kind == LOST_FRAMES, is_active(fault, channel, time))
-        lost = where(gone, 1.0, lost)
-    return lost
+def _lost(p: Parameters, time: Scalar) -> tuple[Vector3, Vector3]:
+    """1.0 for each gyro and each axis of the accelerometer whose word does not reach the processor."""
+    silent = [where(both(fault.kind == LOST_FRAMES, is_active(fault, time)), fault.channel, 0.0) for fault in p.fault]
+
+    def lost(channel: int) -> Scalar:
+        return where(either(silent[0] == channel + 1, silent[1] == channel + 1), 1.0, 0.0)
+
+    return each_axis(lost), each_axis(lambda i: lost(3 + i))
 
 
-def acquire(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
-    """The processor's timer fires: the registers are read; words are counted that come twice or not at all."""
-    before = state.reading
-    attitude = state.attitude._replace(rate_before=state.signal.rate.estimate)
-    read = _read(state.gyro, state.accelerometer, state.slow, inputs, p, k)
-    readings = before.readings + 1.0
-    time = readings * k.processor_period
-    lost = each_axis(lambda i: _lost(i, p, time))
-    # a lost word has not been read: it counts as missed once one arrives again
-    words = each_axis(lambda i: where(lost[i] > 0.5, before.gyro_words[i], state.gyro[i].words))
-    fresh = [words[i] - before.gyro_words[i] for i in range(3)]
-    fresh.append(state.accelerometer.words - before.accelerometer_words)
-    repeated, missed = before.repeated, before.missed
-    real = where(p.ideal > 0.5, 0.0, 1.0)
-    for count, gone in zip(fresh, (*lost, 0.0), strict=True):
-        repeated = repeated + where(count + gone < 0.5, real, 0.0)
-        missed = missed + maximum(count - 1.0, 0.0)
-    reading = ReadingState(
-        each_axis(lambda i: where(lost[i] > 0.5, before.rate[i], read.rate[i])),
-        each_axis(lambda i: where(_lost(3 + i, p, time) > 0.5, before.specific_force[i], read.specific_force[i])),
-        words,
-        state.accelerometer.words,
-        minimum(repeated, _MOST_COUNTED),
-        minimum(missed, _MOST_COUNTED),
-        readings,
-    )
-    return State(*state[:3], reading, state.signal, attitude, *state[6:])
+_ALL_NEW: Vector3 = (1.0, 1.0, 1.0)
+
+
+def _exchange(number: Scalar, gyro_is_new: Vector3, part_is_new: Vector3, slow: SlowState, p: Parameters) -> Exchange:
+    return Exchange(number, gyro_is_new, part_is_new, slow.supply_voltage, where(p.gyro.self_test > 0.5, 1.0, 0.0))
+
+
+def _unless(lost: Vector3, arrived: Vector3, before: Vector3) -> Vector3:
+    """What has arrived; where a word was lost, what was there before."""
+    return each_axis(lambda i: where(lost[i] > 0.5, before[i], arrived[i]))
+
+
+def _acquire(answering: Answering) -> TaskStep:
+    """The processor's timer fires: the parts answer; words are counted that come twice or not at all."""
+
+    def step(state: State, inputs: Inputs, p: Parameters, k: Coefficients, _draws: tuple[Any, ...]) -> State:
+        before, part = state.reading, registers(state.accelerometer, k.accelerometer)
+        attitude = state.attitude._replace(rate_before=state.signal.rate.estimate)
+        read = _read(state.gyro, part, state.slow, inputs, p, k)
+        readings = before.readings + 1.0
+        time = readings * k.processor_period
+        lost_rate, lost_force = _lost(p, time)
+        # a lost word has not been read: it counts as missed once one arrives again
+        gyro_words = _unless(lost_rate, each_axis(lambda i: state.gyro[i].words), before.gyro_words)
+        count = state.accelerometer.words
+        part_words = _unless(lost_force, (count, count, count), before.accelerometer_words)
+        new_rates = subtract(gyro_words, before.gyro_words)
+        new_forces = subtract(part_words, before.accelerometer_words)
+        repeated, missed = before.repeated, before.missed
+        real = where(p.ideal > 0.5, 0.0, 1.0)
+        for new, gone in zip((*new_rates, *new_forces), (*lost_rate, *lost_force), strict=True):
+            repeated = repeated + where(new + gone < 0.5, real, 0.0)
+            missed = missed + maximum(new - 1.0, 0.0)
+        now = _exchange(
+            readings,
+            each_axis(lambda i: where(new_rates[i] > 0.5, 1.0, 0.0)),
+            each_axis(lambda i: where(new_forces[i] > 0.5, 1.0, 0.0)),
+            state.slow,
+            p,
+        )
+        arrived = answering(state.gyro, part, now)
+        reading = ReadingState(
+            _unless(lost_rate, read.rate, before.rate),
+            _unless(lost_force, read.specific_force, before.specific_force),
+            gyro_words,
+            part_words,
+            Received(
+                _unless(lost_rate, arrived.gyro, before.received.gyro),
+                _unless(lost_force, arrived.accelerometer, before.received.accelerometer),
+                arrived.status,
+            ),
+            minimum(repeated, _MOST_COUNTED),
+            minimum(missed, _MOST_COUNTED),
+            readings,
+        )
+        return State(*state[:3], reading, state.signal, attitude, *state[6:])
+
+    return step
 
 
 def _signals_as_read(state: State, _inputs: Inputs, _p: Parameters, _k: Coefficients, _draws: tuple[Any, ...]) -> State:
@@ -768,42 +840,45 @@ def _aligning(
     return _Start(q_nb, choose(done > 0.5, nulled, ZERO3), fused, watched), done
 
 
-Solution = tuple[Quaternion, Vector3, FusionState]
-Solver = Callable[[AttitudeState, _Read, Parameters], Solution]
+def _look_for_rest(state: State, _inputs: Inputs, p: Parameters, _k: Coefficients, _draws: tuple[Any, ...]) -> State:
+    attitude, signal = state.attitude, state.signal
+    rate, force = signal.rate.estimate, signal.specific_force.estimate
+    a, h = p.solver.fusion, p.processor.period
+    fusion = with_rest(attitude.fusion, attitude.q_nb, rate, force, a, p.latitude, h)
+    return State(*state[:5], attitude._replace(fusion=fusion), *state[6:])
 
 
-def _integrated(attitude: AttitudeState, signal: _Read, p: Parameters, integrate: Integrator) -> Quaternion:
-    earth = multiply_transposed(matrix_from_quaternion(attitude.q_nb), earth_rate_n(p.latitude))
-    known = add(attitude.bias, earth)
-    before, now = subtract(attitude.rate_before, known), subtract(signal.rate, known)
-    return integrate(attitude.q_nb, before, now, p.processor.period)
+def _integration(integrate: Integrator) -> TaskStep:
+    """The attitude goes on by the rates of the last two readings; the solver has the last word on it."""
+
+    def step(state: State, _inputs: Inputs, p: Parameters, _k: Coefficients, _draws: tuple[Any, ...]) -> State:
+        attitude = state.attitude
+        earth = multiply_transposed(matrix_from_quaternion(attitude.q_nb), earth_rate_n(p.latitude))
+        known = add(attitude.bias, earth)
+        before, now = subtract(attitude.rate_before, known), subtract(state.signal.rate.estimate, known)
+        held = both(p.solver.kind == SOLVER.value("fused"), is_held(attitude.fusion, p.solver.fusion))
+        q_nb = choose(held, attitude.q_nb, integrate(attitude.q_nb, before, now, p.processor.period))
+        return State(*state[:5], attitude._replace(q_nb=q_nb), *state[6:])
+
+    return step
 
 
-def _levelling(integrate: Integrator) -> Solver:
-    def solved(attitude: AttitudeState, signal: _Read, p: Parameters) -> Solution:
-        yaw = euler_from_matrix(matrix_from_quaternion(_integrated(attitude, signal, p, integrate))).yaw
-        return levelled(signal.specific_force, yaw), attitude.bias, attitude.fusion
-
-    return solved
+Solver = Callable[[AttitudeState, _Read, Parameters], Fused]
+"""The solution after one more reading, to which q_nb has been integrated."""
 
 
-def _gyro_only(integrate: Integrator) -> Solver:
-    def solved(attitude: AttitudeState, signal: _Read, p: Parameters) -> Solution:
-        return _integrated(attitude, signal, p, integrate), attitude.bias, attitude.fusion
-
-    return solved
+def _levelling(attitude: AttitudeState, signal: _Read, _p: Parameters) -> Fused:
+    yaw = euler_from_matrix(matrix_from_quaternion(attitude.q_nb)).yaw
+    return Fused(levelled(signal.specific_force, yaw), attitude.bias, attitude.fusion)
 
 
-def _fused(attitude: AttitudeState, signal: _Read, p: Parameters) -> Solution:
-    before = Fused(attitude.q_nb, attitude.bias, attitude.fusion)
-    return fused_step(
-        before,
-        signal.rate,
-        signal.specific_force,
-        p.solver.fusion,
-        p.latitude,
-        p.processor.period,
-    )
+def _gyro_only(attitude: AttitudeState, _signal: _Read, _p: Parameters) -> Fused:
+    return Fused(attitude.q_nb, attitude.bias, attitude.fusion)
+
+
+def _fused(attitude: AttitudeState, signal: _Read, p: Parameters) -> Fused:
+    integrated = Fused(attitude.q_nb, attitude.bias, attitude.fusion)
+    return corrected(integrated, signal.rate, signal.specific_force, p.solver.fusion, p.latitude, p.processor.period)
 
 
 def _solver(running: Solver) -> TaskStep:
@@ -821,23 +896,6 @@ def _solver(running: Solver) -> TaskStep:
         return State(*state[:5], solved, *state[6:])
 
     return step
-
-
-_FUSED_WAY = 0
-"""The fused solver integrates in a way of its own."""
-
-
-def _solver_ways() -> dict[int, TaskStep]:
-    """A step for each solver, and for each integration where it has a choice."""
-    ways = {_FUSED_WAY: _solver(_fused)}
-    for kind, solver in (("levelling", _levelling), ("gyro", _gyro_only)):
-        for number, integrate in INTEGRATORS.items():
-            ways[_solver_way(SOLVER.value(kind), number)] = _solver(solver(integrate))
-    return ways
-
-
-def _solver_way(kind: Scalar, integration: Scalar) -> Scalar:
-    return 10 * kind + integration
 
 
 def _filter(
@@ -870,81 +928,24 @@ def _kalman(before: Euler, variance: Vector3, solved: Euler, p: FilterParameters
     return Euler(*[y for y, _ in pairs]), each_axis(lambda i: pairs[i][1])
 
 
-def _words_of_gyro(axis: int, state: State, p: Parameters, status: Scalar) -> Scalar:
-    """The answer of one gyro: a sensor data response (ADXRS450) or an output word (ADIS16354)."""
-    gyro = state.gyro[axis]
-    checking = where(p.gyro.self_test > 0.5, 1.0, 0.0)
-    lost = where(gyro.condition > 1.5, 1.0, 0.0)
-    worn = where(gyro.condition > 0.5, 1.0, 0.0)
-    faults = adxrs450.FaultBits(
-        phase_lock=maximum(lost, checking),
-        quadrature=checking,
-        memory=checking,
-        power_on_reset=checking,
-        power=checking,
-        self_test=maximum(worn, checking),
-        check=checking,
-    )
-    turns = state.reading.readings
-    sequence = turns - 8.0 * floor(turns / 8.0)
-    response = adxrs450.sensor_data_response(gyro.code, sequence, adxrs450.data_status(checking, lost), faults)
-    fresh = where(gyro.words > state.reading.gyro_words[axis], 1.0, 0.0)
-    word = adis16354.output_word(gyro.code, fresh, adis16354.error_or_alarm(status))
-    return where(p.gyro.filter == _CIC, adxrs450.as_int32(response), word)
-
-
-def _status_word(state: State, p: Parameters) -> Scalar:
-    """STATUS of an ADIS16354: self-test failures of stuck or silent channels, range, supply."""
-    gyro = [where(one.condition > 0.5, 1.0, 0.0) for one in state.gyro]
-    part = [where(one > 0.5, 1.0, 0.0) for one in state.accelerometer.condition]
-    failed = maximum(maximum(maximum(gyro[0], gyro[1]), gyro[2]), maximum(maximum(part[0], part[1]), part[2]))
-    beyond = maximum(
-        maximum(state.gyro[0].over_range, state.gyro[1].over_range),
-        maximum(state.gyro[2].over_range, state.accelerometer.over_range),
-    )
-    volts = state.slow.supply_voltage
-    status = adis16354.Status(
-        z_acceleration=part[2],
-        y_acceleration=part[1],
-        x_acceleration=part[0],
-        z_gyro=gyro[2],
-        y_gyro=gyro[1],
-        x_gyro=gyro[0],
-        self_test=failed,
-        over_range=beyond,
-        supply_high=where(volts > 5.25, 1.0, 0.0),
-        supply_low=where(volts < 4.75, 1.0, 0.0),
-    )
-    return where(p.gyro.filter == _CIC, 0.0, adis16354.status_word(status))
-
-
-def _registers(state: State, p: Parameters) -> RegisterOutputs:
-    status = _status_word(state, p)
-    part = state.accelerometer
-    fresh = where(part.words > state.reading.accelerometer_words, 1.0, 0.0)
-    error = adis16354.error_or_alarm(status)
-    decimates = p.accelerometer.filter == _DECIMATOR
+def _registers(state: State, part: RegisterWords, p: Parameters) -> RegisterOutputs:
+    words = exchange.shown_words(state.reading.received, p.gyro.filter == _CIC)
     return RegisterOutputs(
-        (state.gyro[0].code, state.gyro[1].code, state.gyro[2].code),
+        each_axis(lambda i: state.gyro[i].code),
         part.code,
         thermometer_code(p.gyro.thermometer, state.slow.gyro_temperature),
         thermometer_code(p.accelerometer.thermometer, state.slow.accelerometer_temperature),
-        each_axis(lambda i: _words_of_gyro(i, state, p, status)),
-        each_axis(
-            lambda i: where(
-                decimates, adxl355.data_word(part.code[i]), adis16354.output_word(part.code[i], fresh, error)
-            )
-        ),
-        status,
+        *words,
     )
 
 
-def outputs(state: State, p: Parameters, _k: Coefficients) -> Outputs:
-    """Angles, signals as read and registers, as they stand after the last reading."""
+def outputs(state: State, p: Parameters, k: Coefficients) -> Outputs:
+    """Angles and signals as they stand after the last reading, registers as they are now."""
     attitude, reading = state.attitude, state.reading
+    part = registers(state.accelerometer, k.accelerometer)
     beyond = maximum(
         maximum(state.gyro[0].over_range, state.gyro[1].over_range),
-        maximum(state.gyro[2].over_range, state.accelerometer.over_range),
+        maximum(state.gyro[2].over_range, part.over_range),
     )
     return Outputs(
         euler=state.filter.euler,
@@ -953,7 +954,7 @@ def outputs(state: State, p: Parameters, _k: Coefficients) -> Outputs:
         rate_corrected=subtract(reading.rate, attitude.bias),
         gyro_bias=attitude.bias,
         specific_force_measured=reading.specific_force,
-        register=_registers(state, p),
+        register=_registers(state, part, p),
         sample=SampleOutputs(reading.repeated, reading.missed),
         die_temperature=DieTemperatureOutputs(state.slow.gyro_temperature, state.slow.accelerometer_temperature),
         aligned=attitude.aligned > 0.5,
@@ -965,29 +966,36 @@ def outputs(state: State, p: Parameters, _k: Coefficients) -> Outputs:
     )
 
 
-_TAPS_RULE = (
-    "the ADIS16354 takes +-150 deg/s with 4 taps or more (bartlett_4), +-75 deg/s with 16 or more, +-300 deg/s always; "
-    "the register word ends at gyro.code_limit LSB of gyro.resolution"
-)
+_RANGE_ROUNDING = 5e-6
+"""Part of a range by which six digits of it may be off."""
 
 
-def _gyro_range(p: Parameters) -> tuple[Scalar, Scalar]:
-    """What taps and register word leave of the gyros' range."""
-    taps = p.gyro.filter
-    least = where(
-        taps == _CIC,
-        0.0,
-        where(
-            taps >= GYRO_FILTER.value("bartlett_16"),
-            75.0,
-            where(taps >= GYRO_FILTER.value("bartlett_4"), 150.0, 300.0),
-        ),
-    )
-    return least * (PI / 180.0) * (1.0 - 1e-9), p.gyro.code_limit * p.gyro.resolution * (1.0 + 1e-9)
+def _offered_range(p: Parameters) -> tuple[Scalar, Scalar]:
+    """The range that an ADIS16354 offers with its taps, the nearest; of another part whatever it is."""
+    exponent = p.gyro.filter - GYRO_FILTER.value("bartlett_1")
+    offered = where(p.gyro.filter == _CIC, p.gyro.range, adis16354.nearest_range(p.gyro.range, exponent))
+    return offered * (1.0 - _RANGE_ROUNDING), offered * (1.0 + _RANGE_ROUNDING)
+
+
+def _gyros_filter(p: Parameters) -> tuple[Scalar, Scalar]:
+    """The accelerometer's filter that goes with that of the gyros: the same taps, or CIC and decimator."""
+    return p.gyro.filter, p.gyro.filter
+
+
+def _offered_divider(p: Parameters) -> tuple[Scalar, Scalar]:
+    """The nearest divider that SMPL_PRD can make; of another part whatever it is."""
+    offered = where(p.gyro.filter == _CIC, p.gyro.divider, adis16354.nearest_divider(p.gyro.divider))
+    return offered, offered
+
+
+def _gyros_divider(p: Parameters) -> tuple[Scalar, Scalar]:
+    """The divider of the gyros; for another part whatever the accelerometer's is."""
+    wanted = where(p.gyro.filter == _CIC, p.accelerometer.divider, p.gyro.divider)
+    return wanted, wanted
 
 
 def _rules() -> tuple[Rule, ...]:
-    """Range, taps and resolution must fit the parts; a fault must begin before it ends."""
+    """Range, taps, divider and resolution must fit the parts; a fault must begin before it ends."""
     faults = tuple(
         Rule(
             f"fault[{i + 1}].start",
@@ -997,11 +1005,40 @@ def _rules() -> tuple[Rule, ...]:
         for i in range(2)
     )
     return (
-        Rule("gyro.range", _TAPS_RULE, _gyro_range),
+        Rule("gyro.range", f"SENS/AVG of an ADIS16354 offers {adis16354.ranges_in_words()}", _offered_range),
+        Rule(
+            "accelerometer.filter",
+            "one SENS/AVG sets the taps of an ADIS16354's gyros and accelerometers (ADIS16350/55 Rev. B), the "
+            "decimator goes with the CIC: the number is that of gyro.filter",
+            _gyros_filter,
+        ),
+        Rule(
+            "gyro.divider",
+            "SMPL_PRD of an ADIS16354 makes 1 to 64 and the multiples of 31 up to 1984 (ADIS16350/55 Rev. B Table 17)",
+            _offered_divider,
+        ),
+        Rule(
+            "accelerometer.divider",
+            "one SMPL_PRD sets the samples of an ADIS16354's gyros and accelerometers (ADIS16350/55 Rev. B Table 17)",
+            _gyros_divider,
+        ),
+        Rule(
+            "gyro.range",
+            "the register word ends at gyro.code_limit LSB of gyro.resolution",
+            lambda p: (0.0, p.gyro.code_limit * p.gyro.resolution * (1.0 + 1e-9)),
+        ),
         Rule(
             "accelerometer.range",
             "the register word ends at accelerometer.code_limit LSB of accelerometer.resolution",
             lambda p: (0.0, p.accelerometer.code_limit * p.accelerometer.resolution * (1.0 + 1e-9)),
+        ),
+        *(
+            Rule(
+                f"{part}.thermometer.lowest_code",
+                "above the highest code",
+                lambda p, part=part: (-inf, getattr(p, part).thermometer.highest_code),  # type: ignore[misc]
+            )
+            for part in ("gyro", "accelerometer")
         ),
         *faults,
     )
@@ -1077,7 +1114,12 @@ MODEL = Model(
             every=lambda k: k.accelerometer.decimation,
             normals=10,
         ),
-        Task("acquire", "processor", acquire),
+        Task(
+            "acquire",
+            "processor",
+            {_CIC: _acquire(exchange.of_adxrs450_and_adxl355), _BARTLETT: _acquire(exchange.of_adis16354)},
+            choice=lambda p: where(p.gyro.filter == _CIC, _CIC, _BARTLETT),
+        ),
         Task(
             "signal_filter",
             "processor",
@@ -1087,13 +1129,22 @@ MODEL = Model(
             },
             choice=lambda p: p.signal_filter.kind,
         ),
+        Task("rest", "processor", {SOLVER.value("fused"): _look_for_rest}, choice=lambda p: p.solver.kind),
+        Task(
+            "integrate",
+            "processor",
+            {number: _integration(integrate) for number, integrate in INTEGRATORS.items()},
+            choice=lambda p: p.solver.integration,
+        ),
         Task(
             "solve",
             "processor",
-            _solver_ways(),
-            choice=lambda p: where(
-                p.solver.kind == SOLVER.value("fused"), _FUSED_WAY, _solver_way(p.solver.kind, p.solver.integration)
-            ),
+            {
+                SOLVER.value("levelling"): _solver(_levelling),
+                SOLVER.value("gyro"): _solver(_gyro_only),
+                SOLVER.value("fused"): _solver(_fused),
+            },
+            choice=lambda p: p.solver.kind,
         ),
         Task(
             "filter",

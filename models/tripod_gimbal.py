@@ -53,7 +53,7 @@ from .plants.rig import (
     potential_energy,
     rk4,
 )
-from .plants.rig_rules import MARGIN, body_rules, pulse_rule, start_rule
+from .plants.rig_rules import MARGIN, body_rules, pulse_rule, start_rule, wind_rule
 from .plants.tripod import Head, Tripod, attitude, attitude_quaternion, carried_inertia, mount
 from .plants.wind import (
     SPECTRUM,
@@ -116,12 +116,16 @@ class JointStops(NamedTuple):
     roll: EndStop = _within(60.0)
 
 
+_FASTEST_JOINT = 10.0
+"""rad/s, that a joint starts with or hits its end stop with, whose damping grows with the rate; assumption."""
+
+
 class Initial(NamedTuple):
     """Where the run starts: at rest, the tripod sunk into its equilibrium."""
 
     heading: Annotated[float, Real("rad", "of the tripod, clockwise from north", -10.0, 10.0, "deg")] = 0.0
     joint: Annotated[Axes, Real("rad", "joint angle", -4.0, 4.0, "deg")] = NO_AXES
-    joint_rate: Annotated[Axes, Real("rad/s", "joint rate", -20.0, 20.0, "deg/s")] = NO_AXES
+    joint_rate: Annotated[Axes, Real("rad/s", "joint rate", -_FASTEST_JOINT, _FASTEST_JOINT, "deg/s")] = NO_AXES
 
 
 class Parameters(NamedTuple):
@@ -461,9 +465,6 @@ def energy(state: State, p: Parameters, c: Coefficients) -> Scalar:
 _LEAST_MASS = 1e-9
 """kg; keeps a weightless gimbal's centre of gravity defined."""
 
-_HARDEST_IMPACT = 10.0
-"""rad/s, on an end stop; its damping grows with the rate."""
-
 
 def _mounts_fastest(p: Parameters, c: Coefficients, axis: int) -> Scalar:
     """Bound of the modes of tripod and head about an axis, the gimbal a mass on top: traces of M^-1 K and M^-1 C."""
@@ -491,7 +492,7 @@ def _joints_fastest(p: Parameters, c: Coefficients, axis: int) -> Scalar:
     braking = motor.torque_constant * motor.torque_constant / motor.resistance
     damping = friction.damping + friction.viscous + cable.damping + braking
     bumper = sqrt(stop.stiffness / inertia)
-    return maximum(sqrt(springs / inertia) + damping / inertia, bumper * (1.0 + stop.loss * _HARDEST_IMPACT))
+    return maximum(sqrt(springs / inertia) + damping / inertia, bumper * (1.0 + stop.loss * _FASTEST_JOINT))
 
 
 def _fastest(p: Parameters) -> Scalar:
@@ -516,7 +517,7 @@ def _tipping(p: Parameters, height: Scalar) -> Scalar:
 
 def _rules() -> tuple[Rule, ...]:
     """Bodies must be rigid, pulses must end before they start again, tripod and head must stand, joints must start
-    between their stops, the step must be stable.
+    between their stops, the step must be stable, the wind's clock must follow the vortices.
 
     A step times the fastest rate of 1 is half of what RK4 and the splitting bear.
     """
@@ -541,6 +542,7 @@ def _rules() -> tuple[Rule, ...]:
             "too long for the stiffness and damping of tripod, head, friction and stops",
             lambda p: (0.0, 1.0 / _fastest(p)),
         ),
+        wind_rule(),
     )
 
 

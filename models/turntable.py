@@ -51,13 +51,18 @@ from .plants.turntable_profile import (
 )
 from .plants.turntable_reference import Reference, toward_angle, toward_rate
 from .plants.turntable_servo import AxisMotion, Servo, followed, servo
-from .plants.turntable_shock import Shock, mean_acceleration, shocks_felt
+from .plants.turntable_shock import Shock, mean_acceleration, pulse_length, speed_felt
 from .plants.vibration import (
+    HELD_STILL,
     QUIET,
+    Held,
+    Holder,
     Oscillations,
     Oscillator,
     Shaking,
     Tilt,
+    held,
+    holder,
     oscillated_axes,
     oscillator,
 )
@@ -148,6 +153,7 @@ class Coefficients(NamedTuple):
     errors: tuple[AxisErrors, AxisErrors, AxisErrors]
     tilt: Oscillator
     shaking: Oscillator
+    holder: Holder
     mounting: Annotated[Matrix3, Real("1", "turns the sensor's axes into the plate's")]
     mounting_quaternion: Annotated[Quaternion, Real("1", "the same as a quaternion")]
 
@@ -169,7 +175,8 @@ class State(NamedTuple):
     axis: tuple[AxisMotion, AxisMotion, AxisMotion]
     tilt: Oscillations
     shaking: Oscillations
-    shocks: Annotated[float, Real("1", "pulses taken")]
+    held: tuple[Held, Held, Held]
+    shocks: Annotated[float, Real("1", "speed by pulses, in that of a half sine")]
     shock: Annotated[Vector3, Real("m/s2", "acceleration by pulses, mean of the last period")]
     air: Air
 
@@ -211,6 +218,7 @@ def coefficients(p: Parameters) -> Coefficients:
         ),
         tilt=oscillator(p.tilt.frequency, p.tilt.damping_ratio, p.period),
         shaking=oscillator(p.shaking.frequency, p.shaking.damping_ratio, p.period),
+        holder=holder(p.shaking, p.period),
         mounting=matrix_from_euler(mounting),
         mounting_quaternion=quaternion_from_euler(mounting),
     )
@@ -229,7 +237,8 @@ def initial_state(p: Parameters, _c: Coefficients, _inputs: Inputs) -> State:
         axis=(AxisMotion(outer, 0.0, 0.0), AxisMotion(middle, 0.0, 0.0), AxisMotion(inner, 0.0, 0.0)),
         tilt=QUIET,
         shaking=QUIET,
-        shocks=shocks_felt(p.shock, 0.0),
+        held=HELD_STILL,
+        shocks=speed_felt(p.shock, 0.0),
         shock=ZERO3,
         air=Air(start, start),
     )
@@ -285,7 +294,9 @@ def sway(state: State, _inputs: Inputs, _p: Parameters, c: Coefficients, normals
 
 def shake(state: State, _inputs: Inputs, _p: Parameters, c: Coefficients, normals: tuple[Scalar, ...]) -> State:
     """The bench's next acceleration."""
-    return state._replace(shaking=oscillated_axes(c.shaking, state.shaking, state.ticks < 0.5, normals))
+    shaking = oscillated_axes(c.shaking, state.shaking, state.ticks < 0.5, normals)
+    x, y, z = [held(c.holder, now, push.value) for now, push in zip(state.held, shaking, strict=True)]
+    return state._replace(shaking=shaking, held=(x, y, z))
 
 
 def _referred(reference: Reference, axis: Axis, mode: Scalar, angle: Scalar, rate: Scalar, period: Scalar) -> Reference:
@@ -308,7 +319,7 @@ def move(state: State, _inputs: Inputs, p: Parameters, c: Coefficients, _normals
         after = _referred(before, axis, command.mode, command.angle[i], command.rate[i], h)
         references.append(after)
         motions.append(followed(c.servo[i], state.axis[i], before, after.angle, h))
-    shocks = shocks_felt(p.shock, ticks * h)
+    shocks = speed_felt(p.shock, ticks * h)
     return state._replace(
         ticks=ticks,
         reference=(references[0], references[1], references[2]),
@@ -332,8 +343,8 @@ def bench_motion(state: State, p: Parameters) -> Motion:
 
 def _bench_acceleration(state: State, p: Parameters) -> Vector3:
     """Along the bench's axes, m/s^2."""
-    (right, forward, up), (x, y, z) = p.shaking.rms, state.shaking
-    return add((right * x.value, forward * y.value, up * z.value), state.shock)
+    (right, forward, up), (x, y, z) = p.shaking.rms, state.held
+    return add((right * x.acceleration, forward * y.acceleration, up * z.acceleration), state.shock)
 
 
 def outputs(state: State, p: Parameters, c: Coefficients) -> Outputs:
@@ -367,7 +378,7 @@ def outputs(state: State, p: Parameters, c: Coefficients) -> Outputs:
 
 def _spacing(p: Parameters) -> tuple[Scalar, Scalar]:
     """A pulse is over when the next one begins."""
-    return where(p.shock.pulses > 1.0, p.shock.duration, 0.0), inf
+    return where(p.shock.pulses > 1.0, pulse_length(p.shock), 0.0), inf
 
 
 def _is_there(rms: Any) -> Scalar:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from attitude_fmu.models.attitude_sensor import MODEL, Inputs, Parameters
@@ -17,7 +18,7 @@ NO_ERRORS = {
 """What even a nominal piece has, and the default's processor."""
 
 AS_FINE_AS_CAN_BE = {
-    "gyro.range": 5.24,
+    "gyro.range": math.radians(300.0),
     "gyro.resolution": 2.5e-9,
     "gyro.code_limit": 2**31 - 1,
     "accelerometer.range": 20.0,

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import random
 from typing import Any
 
 from attitude_fmu.models.errors import ValueRefusedError
-from attitude_fmu.models.record import Boolean, Enumeration, Integer, Leaf, Real, defaults, flatten, leaves, unflatten
+from attitude_fmu.models.record import (
+    Boolean,
+    Enumeration,
+    Integer,
+    Leaf,
+    Real,
+    check,
+    defaults,
+    flatten,
+    leaves,
+    unflatten,
+)
 from attitude_fmu.models.system import Model, check_rules
 
 COUNTERS = {
@@ -23,18 +35,23 @@ COUNTERS = {
     "accelerometer.samples": (0, 4, 5, 7),
     "accelerometer.silent": (0, 0, 1, 2),
     "accelerometer.words": (0, 1, 300),
-    **{f"accelerometer.condition[{axis}]": (0, 0, 1, 2) for axis in (1, 2, 3)},
+    **{f"accelerometer.{w}.condition[{axis}]": (0, 0, 1, 2) for w in ("latest", "earlier") for axis in (1, 2, 3)},
     **{f"gyro[{axis}].condition": (0, 0, 1, 2) for axis in (1, 2, 3)},
     **{f"gyro[{axis}].words": (0, 1, 300, 15_000) for axis in (1, 2, 3)},
     **{f"{part}.misalignment[{axis}]": (0.0, 0.0, 0.01) for part in ("gyro", "accelerometer") for axis in (1, 2, 3)},
+    "gyro.range": (math.radians(75.0), math.radians(150.0), math.radians(300.0)),
     **{f"fault[{i}].start": (0.0, 0.0, 0.3, 1e9) for i in (1, 2)},
     **{f"fault[{i}].end": (0.0, 0.5, 1e9, 1e9) for i in (1, 2)},
     **{f"fault[{i}].size": (-1.0, 0.1) for i in (1, 2)},
 }
-"""Values that reach every branch: start, shutter and knock, end of the alignment, rest, a due word, silence, faults."""
+"""Values that reach every branch: start, shutter and knock, end of the alignment, rest, a due word, silence, faults,
+and the ranges that every part has."""
 
 NEVER_WILD = ("attitude.q_nb", "attitude.fusion.covariance")
 """What no run can bring to zero or to a hundred times itself."""
+
+LEAST = {"solver_period": 1e-4}
+"""Steps shorter than these make random runs last."""
 
 
 def near(leaf: Leaf, value: float, chance: random.Random) -> float:
@@ -76,12 +93,31 @@ def bits(values: list[float]) -> list[str]:
     return [float(value).hex() for value in values]
 
 
+def reconciled(model: Model, parameters: list[float]) -> list[float] | None:
+    """Parameters that go together: those that a rule refuses back at their start values, or as near as the rule lets.
+
+    None where that is not enough, or where a run would take very many steps.
+    """
+    found = list(parameters)
+    places = {leaf.name: (place, leaf.start) for place, leaf in enumerate(leaves(model.Parameters))}
+    for rule in model.rules:
+        low, high = rule.limits(unflatten(model.Parameters, found))
+        place, start = places[rule.field]
+        if not low <= found[place] <= high:
+            found[place] = type(start)(min(max(start, low), high))
+        if found[place] < LEAST.get(rule.field, found[place]):
+            return None
+    try:
+        check(model.Parameters, found, model.name)
+        check_rules(model, unflatten(model.Parameters, found), model.name)
+    except ValueRefusedError:
+        return None
+    return found
+
+
 def legal_parameters(model: Model, chance: random.Random) -> list[float]:
     """Random parameters that go together."""
     while True:
-        parameters = points_near(model.Parameters, defaults(model.Parameters), chance)
-        try:
-            check_rules(model, unflatten(model.Parameters, parameters), model.name)
-        except ValueRefusedError:
-            continue
-        return parameters
+        parameters = reconciled(model, points_near(model.Parameters, defaults(model.Parameters), chance))
+        if parameters is not None:
+            return parameters

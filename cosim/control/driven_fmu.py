@@ -14,8 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from attitude_fmu.fmu_src.errors import did_you_mean
+
 from ..bench import settable
-from ..errors import SystemRefusedError, did_you_mean
+from ..errors import SystemRefusedError
 from ..interface import Interface, Value, Variable, read_interface
 from ..slave import WARNING, Feed, Slave
 from ..system import Component

@@ -19,7 +19,9 @@ import control as ct  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SystemRefusedError, did_you_mean
+from attitude_fmu.fmu_src.errors import did_you_mean
+
+from ..errors import SystemRefusedError
 from ..interface import Value, Variable
 from ..multisine import Bins, Measured, is_settling, measured, multisine, odd_bins
 from .driven_fmu import Array, DrivenFmu, Signals

@@ -8,11 +8,12 @@ import unicodedata
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
+from attitude_fmu.fmu_src.errors import did_you_mean
 from attitude_fmu.fmu_src.units import UnknownUnitError, parse, quantity_of
 from attitude_fmu.models.linear_controller import Signal
 from attitude_fmu.models.record import Real
 
-from ..errors import ExportRefusedError, did_you_mean
+from ..errors import ExportRefusedError
 
 _UNIT = re.compile(r"(.*\S)\s*\[([^\[\]]+)\]\s*")
 _INDEX = re.compile(r"(.*?)\[(\d+)\]")

@@ -14,13 +14,13 @@ import numpy as np
 from scipy import sparse  # type: ignore[import-untyped]
 
 from attitude_fmu.fmu_src import catalogue
-from attitude_fmu.fmu_src.errors import BuildError
+from attitude_fmu.fmu_src.errors import BuildError, did_you_mean
 from attitude_fmu.fmu_src.interface import Interface
 from attitude_fmu.fmu_src.trace import Running, Traced, trace_running
 from attitude_fmu.models.record import Enumeration, Integer, Real, defaults, flatten, leaves, unflatten
 from attitude_fmu.models.system import STOPPED, Model, Run
 
-from ..errors import LinearisationRefusedError, did_you_mean
+from ..errors import LinearisationRefusedError
 
 Source = Model | str
 """A model, or the name of an FMU in the catalogue, which may name a device: ``AttitudeSensor_ADIS16354_150``."""

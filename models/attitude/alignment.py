@@ -1,7 +1,7 @@
 """Alignment at rest: pitch and roll from the mean specific force, yaw from outside, gyro bias from the mean rate.
 
 After the 2010 paper, section 1.1 and the part's "precision automatic bias null" (30 s at rest). A body that moves
-meanwhile spoils all three: `with_watched_sample` begins anew then, and keeps what tells how good the means are.
+meanwhile spoils all three: `with_watched_sample` begins anew then.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from ..record import Boolean, Quaternion, Real, Vector3, choose
-from ..scalar import Scalar, absolute, atan2, both, cos, either, exp, floor, hypot, maximum, sin, sqrt, where
+from ..scalar import Scalar, absolute, both, either, exp, floor, maximum, where
 from ..sensors.adxrs450_sheet import NULL_ACCURACY
-from ..vectors import ZERO3, add, dot, each_axis, multiply_transposed, scale, subtract
+from ..vectors import ZERO3, add, dot, multiply_transposed, scale, subtract
 from .rotations import (
     Euler,
     earth_rate_n,
@@ -86,7 +86,8 @@ class MotionParameters(NamedTuple):
     """What counts as motion during the alignment: readings of the last moment away from the mean so far.
 
     Vibration passes, having no mean; tilting, turning and pushing do not. A steady turn about the vertical is seen by
-    `AlignmentParameters.largest_null` alone.
+    `AlignmentParameters.largest_null` alone. The three are assumptions: far above the default parts' noise averaged
+    over `memory` (4e-4 rad/s, 4e-4 m/s^2), far below what a hand does to the sensor.
     """
 
     restart: Annotated[bool, Boolean("begin the averaging anew when the body moves")] = True
@@ -102,33 +103,21 @@ class MotionParameters(NamedTuple):
 
 
 class WatchedAlignment(NamedTuple):
-    """Sums of the samples since the body last moved, and how far they scatter."""
+    """Sums of the samples since the body last moved, and what was read lately."""
 
     sums: AlignmentState
-    rate_squares: Annotated[Vector3, Real("rad2/s2", "squared deviations of the rate from its mean, summed")]
-    specific_force_squares: Annotated[Vector3, Real("m2/s4", "those of the specific force")]
     rate_lately: Annotated[Vector3, Real("rad/s", "low-passed rate")]
     specific_force_lately: Annotated[Vector3, Real("m/s2", "low-passed specific force")]
-    restarts: Annotated[float, Real("1", "times that the averaging began anew")]
 
 
-NOTHING_SEEN = WatchedAlignment(AlignmentState(0.0, ZERO3, ZERO3), ZERO3, ZERO3, ZERO3, ZERO3, 0.0)
+NOTHING_SEEN = WatchedAlignment(AlignmentState(0.0, ZERO3, ZERO3), ZERO3, ZERO3)
 """The alignment before its first sample."""
-
-
-def _scatter(squares: Vector3, deviation: Vector3, n: Scalar) -> Vector3:
-    """Sum of squared deviations after one more sample, `deviation` away from the mean of the n before (Welford)."""
-    share = n / (n + 1.0)
-    return each_axis(lambda i: squares[i] + share * deviation[i] * deviation[i])
 
 
 def with_watched_sample(
     watched: WatchedAlignment, force: Vector3, rate: Vector3, p: MotionParameters, h: Scalar
 ) -> WatchedAlignment:
     """The sums after one more sample, h seconds after the one before; of this sample alone if the body has moved."""
-    n, f, w = watched.sums
-    share = 1.0 / maximum(n, 1.0)
-    mean_force, mean_rate = scale(share, f), scale(share, w)
     sums = with_sample(watched.sums, force, rate)
     # a plain mean, that of the sums, until the memory is full: a few samples scatter too much to tell of motion
     gain = maximum(1.0 / sums.samples, 1.0 - exp(-h / p.memory))
@@ -142,52 +131,6 @@ def with_watched_sample(
         dot(turned, turned) > p.rate * p.rate,
     )
     moved = both(p.restart > 0.5, beyond)
-    going_on = WatchedAlignment(
-        sums,
-        _scatter(watched.rate_squares, subtract(rate, mean_rate), n),
-        _scatter(watched.specific_force_squares, subtract(force, mean_force), n),
-        rate_lately,
-        force_lately,
-        watched.restarts,
-    )
-    anew = WatchedAlignment(AlignmentState(1.0, force, rate), ZERO3, ZERO3, rate, force, watched.restarts + 1.0)
+    going_on = WatchedAlignment(sums, rate_lately, force_lately)
+    anew = WatchedAlignment(AlignmentState(1.0, force, rate), rate, force)
     return WatchedAlignment(*choose(moved, anew, going_on))
-
-
-def standard_error(squares: Vector3, samples: Scalar) -> Vector3:
-    """sqrt(sum of squared deviations / (n (n - 1))) of each axis: how well n samples know their mean.
-
-    For independent samples; noise that is AR(1) with coefficient a knows it worse by sqrt((1 + a)/(1 - a)).
-    """
-    n = maximum(samples, 2.0)
-    return each_axis(lambda i: sqrt(squares[i] / (n * (n - 1.0))))
-
-
-def tilt_error(force: Vector3, error: Vector3) -> tuple[Scalar, Scalar]:
-    """Standard deviations of pitch and roll (rad) whose specific force has the `error` (standard deviations, m/s^2).
-
-    d theta = (h df_y - f_y (f_x df_x + f_z df_z)/h)/|f|^2,  d gamma = (f_x df_z - f_z df_x)/h^2,  h^2 = f_x^2 + f_z^2.
-    """
-    x, y, z = force
-    level = maximum(hypot(x, z), 1e-9)  # straight up or down roll means nothing
-    square = level * level
-    ex, ey, ez = error
-    pitch = hypot(level * ey, y / level * hypot(x * ex, z * ez)) / (square + y * y)
-    return pitch, hypot(x * ez, z * ex) / square
-
-
-# --- heading ---------------------------------------------------------------------------------------------------------
-
-
-def heading_from_magnetic(m_b: Vector3, pitch: Scalar, roll: Scalar) -> Scalar:
-    """psi_m = atan2(-m_x, m_y), m = Rx(theta) Ry(gamma) m_b: heading against magnetic north of a tilted body.
-
-    m_b is the Earth's magnetic field in body axes, in any unit; -pi to pi. True yaw is psi_m and the declination (east
-    positive). Tilt known wrongly by d tips the vertical part of the field in: tan(dip) d, 2 d at 63 deg of dip.
-    Source: the 2010 paper, section 1.1, in words.
-    """
-    x, y, z = m_b
-    st, ct, sg, cg = sin(pitch), cos(pitch), sin(roll), cos(roll)
-    across = cg * x + sg * z
-    along = ct * y - st * (cg * z - sg * x)
-    return atan2(-across, along)

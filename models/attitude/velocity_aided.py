@@ -4,15 +4,19 @@ Specific force is integrated in navigation coordinates to a horizontal velocity;
 measurement 0 = v + n, corrects tilt and gyro bias. Averaging thus happens in a frame that does not turn with the
 body, so that linear acceleration, which has no mean, hurts little.
 
-    q <- q (x) exp(w h),  w = gyro - b - C_nb' w_ie        phi' = -C_nb db
+    q <- integrated,  w = gyro - b - C_nb' w_ie             phi' = -C_nb db
     v <- v + h (C_nb f)_xy                                  dv_x' = phi_y f_z,  dv_y' = -phi_x f_z
 
 Error state: tilt phi_x, phi_y (navigation axes), velocity dv_x, dv_y, gyro bias db_x, db_y, db_z.
 At rest, seen by both triads staying close to their low-passed selves, the velocity is known much better and the
 low-passed gyro is the bias. A slow steady turn looks the same, so rest is believed only while the mean rate stays near
 the bias found in the alignment, which the filter cannot move. The measurement noise grows with the velocity met
-lately, the tilt noise with the rate (scale and misalignment of real gyros). Own derivation; rest detection after
-Laidig & Seel, "VQF", 2023.
+lately, the tilt noise with the rate (scale and misalignment of real gyros).
+
+Three more statements can be made, and are not by default. `rest_tilt_noise`: a body at rest keeps its attitude, gyros
+are not integrated then; specific force is averaged without end, at the price of what a move turns before it is seen.
+`specific_force_noise`: shaking that is white, whose velocity is a random walk. `push_noise`: a knock leaves a velocity
+that is not known. Own derivation; rest detection after Laidig & Seel, "VQF", 2023.
 """
 
 from __future__ import annotations
@@ -23,7 +27,6 @@ from typing import Annotated, Any, NamedTuple
 from ..record import Matrix3, Quaternion, Real, Vector3, choose
 from ..scalar import Scalar, both, exp, minimum, where
 from ..vectors import ZERO3, add, dot, multiply, multiply_transposed, scale, subtract
-from .integration import turned
 from .rotations import earth_rate_n, matrix_from_quaternion, normalised, quaternion_product
 
 STATES = 7
@@ -36,7 +39,10 @@ Covariance = tuple[
 """Upper triangle of the symmetric 7x7, row by row."""
 
 VELOCITY_MEMORY = 5.0
-"""s over which the velocity met lately is averaged."""
+"""s over which the velocity met lately is averaged: assumption, longer than a swing of the hand."""
+
+_INITIAL_SPEED = 0.1
+"""m/s, standard deviation of the velocity at the end of an alignment: assumption, a body at rest but for trembling."""
 
 
 class FusionParameters(NamedTuple):
@@ -146,7 +152,7 @@ def initial_fusion(
 ) -> FusionState:
     """The filter at the end of an alignment that found `bias` with a standard `deviation`, sure within `doubt`."""
     tilt = a.initial_tilt * a.initial_tilt
-    speed = 0.1 * 0.1
+    speed = _INITIAL_SPEED * _INITIAL_SPEED
     variance = deviation * deviation
     diagonal = (tilt, tilt, speed, speed, variance, variance, variance)
     covariance: Any = tuple(diagonal[i] if i == j else 0.0 for i, j in _PAIRS)
@@ -224,17 +230,34 @@ def _measured(
     )
 
 
-def fused_step(fused: Fused, rate: Vector3, force: Vector3, a: FusionParameters, latitude: Scalar, h: Scalar) -> Fused:
-    """One sample of rate and specific force as read; the rate is taken as the mean since the sample before."""
+def with_rest(
+    fusion: FusionState,
+    q_nb: Quaternion,
+    rate: Vector3,
+    force: Vector3,
+    a: FusionParameters,
+    latitude: Scalar,
+    h: Scalar,
+) -> FusionState:
+    """The filter's state that has looked for rest in a sample, before the attitude is integrated to it."""
+    earth = multiply_transposed(matrix_from_quaternion(q_nb), earth_rate_n(latitude))
+    return fusion._replace(rest=_rest_after(fusion, rate, force, add(fusion.anchor, earth), a, h))
+
+
+def is_held(fusion: FusionState, a: FusionParameters) -> Scalar:
+    """Whether the attitude is held instead of integrated: at rest, where rest is to count as knowledge."""
+    return both(fusion.rest.quiet > a.rest_time, a.rest_tilt_noise > 0.0)
+
+
+def corrected(fused: Fused, rate: Vector3, force: Vector3, a: FusionParameters, latitude: Scalar, h: Scalar) -> Fused:
+    """The solution corrected by a sample as read, to which q_nb has been integrated, after `with_rest`."""
     q, bias, fusion = fused
-    earth = multiply_transposed(matrix_from_quaternion(q), earth_rate_n(latitude))
-    known = add(bias, earth)
-    rest = _rest_after(fusion, rate, force, add(fusion.anchor, earth), a, h)
-    resting = rest.quiet > a.rest_time
-    held = both(resting, a.rest_tilt_noise > 0.0)
-    turn = choose(held, ZERO3, subtract(rate, known))
-    q = turned(q, scale(h, turn))
     c_nb = matrix_from_quaternion(q)
+    earth = multiply_transposed(c_nb, earth_rate_n(latitude))
+    known = add(bias, earth)
+    rest = fusion.rest
+    resting, held = rest.quiet > a.rest_time, is_held(fusion, a)
+    turn = choose(held, ZERO3, subtract(rate, known))
     f_n = multiply(c_nb, force)
     v = fusion.velocity
     vx, vy = v[0] + h * f_n[0], v[1] + h * f_n[1]

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from math import inf
 from typing import Any
 
-from ..scalar import Scalar, maximum, sqrt, where
+from ..scalar import Scalar, floor, maximum, sqrt, where
 from ..system import Rule
 from .gimbal import Axes
+from .wind import longest_period
 
 MARGIN = 1e-9
 """Relative width of a limit: what is computed from decimal numbers may miss it by roundings."""
@@ -59,6 +60,20 @@ def pulse_rule(name: str, length: Callable[[Any], Scalar], why: str) -> Rule:
         return where(getattr(p, name).period > 0.0, length(p), 0.0), inf
 
     return Rule(f"{name}.period", why, limits)
+
+
+def wind_rule() -> Rule:
+    """The wind's clock, a whole number of solver steps, follows the vortices that the body sheds."""
+
+    def limits(p: Any) -> tuple[Scalar, Scalar]:
+        steps = floor(longest_period(p.wind) / p.solver_period * (1.0 + MARGIN))
+        return 0.0, where(p.wind.shedding * p.wind.speed > 0.0, steps * p.solver_period * (1.0 + MARGIN), inf)
+
+    why = (
+        "too long for the vortices, which turn at 0.2 wind.speed/wind.lens_diameter: five of it in a turn are wanted; "
+        "shorten it, and the solver_period where nothing is allowed, or set wind.shedding to 0"
+    )
+    return Rule("wind.period", why, limits)
 
 
 def start_rule(axis: int) -> Rule:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from ..record import Integer, Real, Vector3
-from ..scalar import PI, Scalar, clip, floor, maximum
+from ..scalar import PI, Scalar, clip, floor, maximum, where
 from ..vectors import ZERO3, scale
 from .pulses import half_sine_share
 
@@ -25,13 +25,24 @@ class Shock(NamedTuple):
     duration: Annotated[float, Real("s", "of one half sine", 1e-4, 10.0)] = 0.011  # as in IEC 60068-2-27's tables
     pulses: Annotated[int, Integer("how many", 1, 1_000_000)] = 1
     period: Annotated[float, Real("s", "from one pulse to the next", 0.0, 1e6)] = 1.0
+    rebound: Annotated[
+        float,
+        Real("1", "share of the peak that a half sine the other way has at once; 1: gives the speed back", 0.0, 10.0),
+    ] = 0.0
 
 
-def shocks_felt(shock: Shock, time: Scalar) -> Scalar:
-    """Number of pulses taken by `time` (s), the running one in part."""
+def pulse_length(shock: Shock) -> Scalar:
+    """How long a pulse lasts with its rebound, s."""
+    return where(shock.rebound > 0.0, 2.0, 1.0) * shock.duration
+
+
+def speed_felt(shock: Shock, time: Scalar) -> Scalar:
+    """Speed handed over by `time` (s), in that of a half sine: each pulse leaves 1 - rebound."""
     since = time - shock.start
     cycles = clip(floor(since / maximum(shock.period, _LEAST_PERIOD)), 0.0, shock.pulses - 1.0)
-    return cycles + half_sine_share(since - cycles * shock.period, shock.duration)
+    inside = since - cycles * shock.period
+    back = shock.rebound * half_sine_share(inside - shock.duration, shock.duration)
+    return cycles * (1.0 - shock.rebound) + half_sine_share(inside, shock.duration) - back
 
 
 def mean_acceleration(shock: Shock, felt_before: Scalar, felt: Scalar, period: Scalar) -> Vector3:

@@ -6,6 +6,13 @@ Between ticks the solution is exact, so that rate and acceleration are derivativ
 ticks of any period. One-sided spectrum of x for f well below the tick rate: (4 zeta / (pi f0)) / ((1 - r^2)^2 +
 (2 zeta r)^2) with r = f/f0: flat up to the frequency for zeta 0.7, a peak there for small zeta. A frequency far above
 the tick rate gives white ticks.
+
+A bench that stays in its place cannot be shaken so down to 0 Hz: it would walk away. Held by a spring and a damper, and
+pushed by a force that would give it the acceleration x if it were free, it feels
+
+    d'' = x - 2 zeta w d' - w^2 d,   w = 2 pi lower_frequency,   zeta = 1/sqrt(2),   d = d' = 0 at the start
+
+which fades with the square of the frequency below w.
 """
 
 from __future__ import annotations
@@ -19,6 +26,9 @@ from .second_order import Transition, transition
 
 _LEAST_SQUARE = 1e-30
 """Of the rate's own share at the start; keeps the root's slope finite where ticks are white."""
+
+_LEAST_TURN = 1e-12
+"""rad in a period, of a bench that is not held."""
 
 
 class Tilt(NamedTuple):
@@ -39,6 +49,10 @@ class Shaking(NamedTuple):
     ] = ZERO3
     frequency: Annotated[float, Real("Hz", "end of the flat band, or the resonance", 0.1, 1e4, None, 10.0)] = 100.0
     damping_ratio: Annotated[float, Real("1", "0.7: flat band; small: a resonance", 0.005, 1.0)] = 0.7  # assumption
+    lower_frequency: Annotated[
+        float,
+        Real("Hz", "below it the bench is held in its place, which takes its share of the rms; 0: it is not", 0.0, 1e3),
+    ] = 0.0
 
 
 class Oscillation(NamedTuple):
@@ -105,3 +119,40 @@ def oscillated_axes(c: Oscillator, now: Oscillations, is_first: Scalar, normals:
         oscillated(c, y, is_first, (normals[2], normals[3])),
         oscillated(c, z, is_first, (normals[4], normals[5])),
     )
+
+
+# --- a bench that is held in its place -------------------------------------------------------------------------------
+
+
+class Held(NamedTuple):
+    """One axis of a bench on its spring, pushed by noise of rms 1."""
+
+    spring: Annotated[float, Real("1", "w^2 d, acceleration by the spring")] = 0.0
+    speed: Annotated[float, Real("1", "w d', the speed as an acceleration")] = 0.0
+    acceleration: Annotated[float, Real("1", "mean of d'' over the last period")] = 0.0
+
+
+HELD_STILL = (Held(), Held(), Held())
+
+
+class Holder(NamedTuple):
+    """The spring and the damper over one period, during which the push stays."""
+
+    turn: Annotated[float, Real("rad", "w times the period; 0: not held")]
+    transition: Transition
+
+
+def holder(shaking: Shaking, period: Scalar) -> Holder:
+    """The discrete equations of the held bench."""
+    w = 2.0 * PI * shaking.lower_frequency
+    return Holder(w * period, transition(w, sqrt(0.5), period))
+
+
+def held(c: Holder, now: Held, push: Scalar) -> Held:
+    """The bench at the next tick; one that is not held feels the push."""
+    off = now.spring - push
+    spring = push + c.transition.a * off + c.transition.b * now.speed
+    speed = c.transition.c * off + c.transition.d * now.speed
+    # its mean, so that speed and way are exactly those of the bench
+    mean = (speed - now.speed) / maximum(c.turn, _LEAST_TURN)
+    return Held(spring, speed, where(c.turn > 0.0, mean, push))

@@ -5,7 +5,8 @@
 A body of area A feels gusts of frequency f by the admittance 1/(1 + y^(4/3))^2, y = 2 f sqrt(A)/V (applied to the
 spectrum of the speed); a lag of the corner y = 1/2 stands for it, within 0.07 of its value at y = 0.
 Vortex shedding is a unit vector that turns at f = 0.2 V/D and diffuses, one component of which is the side force.
-Every process starts at its first tick in its stationary distribution, and is interpolated linearly between ticks.
+Every process starts at its first tick in its stationary distribution, and is interpolated linearly between ticks:
+between five of them in a turn of the vortices, their side force loses an eighth of its rms.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ from .gusts import (
 )
 
 _STROUHAL = 0.2
+_TICKS_IN_A_TURN = 5.0
+"""Of the vortices, at least: the line between values that correlate by r has (2 + r)/3 of their power, 0.77 of it."""
+
 _ADMITTANCE_CORNER = 0.5
 _REFERENCE_HEIGHT = 10.0
 """m, of Davenport's wind."""
@@ -60,7 +64,7 @@ class Wind(NamedTuple):
         float, Real("1", "rms of the vertical gusts over mean speed, the Dryden model's sigma_w/V", 0.0, 1.0)
     ] = 0.136  # 0.1 of the wind at 20 ft (MIL-F-8785C), which blows 1.36 times as fast: log profile, roughness 0.03 m
     surface_drag: Annotated[
-        float, Real("1", "surface drag coefficient, the Davenport model's kappa", 0.0, 0.1, None, 0.01)
+        float, Real("1", "surface drag coefficient, the Davenport model's kappa", 1e-4, 0.1, None, 0.01)
     ] = 0.005  # open country [Davenport 1961]
     roughness: Annotated[float, Real("m", "of the ground; the log profile's", 1e-5, 0.2, None, 0.01)] = 0.03  # grass
     across: Annotated[float, Real("1", "rms across over rms along, Davenport's gusts only", 0.0, 2.0)] = (
@@ -116,6 +120,11 @@ class WindState(NamedTuple):
 def reference_speed(wind: Wind) -> Scalar:
     """Mean speed (m/s) at 10 m by the log profile."""
     return wind.speed * log(_REFERENCE_HEIGHT / wind.roughness) / log(wind.height / wind.roughness)
+
+
+def longest_period(wind: Wind) -> Scalar:
+    """Period of the gusts' clock (s) at which it still follows the vortices."""
+    return wind.lens_diameter / (_STROUHAL * maximum(wind.speed, _CALM)) / _TICKS_IN_A_TURN
 
 
 def wind_coefficients(wind: Wind, solver_period: Scalar, every: Scalar) -> WindCoefficients:

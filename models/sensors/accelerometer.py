@@ -1,7 +1,7 @@
 """A three-axis digital accelerometer at its own clock: ADXL355, or the accelerometers of an ADIS16354.
 
-The signal's way: lever arm, sensitivity and mounting, temperature, nonlinearity, rectification; white noise; digital
-filter; offset, fault, range, register word. Two digital filters are offered:
+The signal's way: lever arm, sensitivity and mounting, overload, temperature, nonlinearity, rectification, self-test;
+bandwidth; white noise; digital filter; offset, fault, range, register word. Two digital filters are offered:
 
 * ``decimator``, the ADXL355's: first stage at 4 kHz, sinc^2 decimation to the output data rate, high-pass; the word
   appears after the filter's extra latency;
@@ -18,7 +18,7 @@ from ..scalar import Scalar, absolute, clip, floor, maximum, minimum, round_half
 from ..system import STOPPED
 from ..vectors import ZERO3, add, dot, each_axis, multiply, scale
 from .adxl355_sheet import ADXL355_2G, DELAYS, HIGH_PASS_CORNERS
-from .bandwidth import low_pass, low_pass_gain
+from .bandwidth import low_pass, low_pass_gain, low_pass_share
 from .bias_instability import SIGMA_PER_INSTABILITY
 from .board import BOARD
 from .digital_filter import (
@@ -89,26 +89,34 @@ class AccelerometerParameters(NamedTuple):
     code_limit: Annotated[float, Integer("codes run from minus this to one less", min=2, max=2**31 - 1)] = int(
         ADXL355_2G.si("code_limit")
     )
-    noise_density: Annotated[float, Real("m/(s2.Hz^0.5)", "white noise, one-sided", min=0.0)] = ADXL355_2G.si(
-        "noise_density"
+    noise_density: Annotated[float, Real("m/(s2.Hz^0.5)", "white noise, one-sided, of each axis", min=0.0)] = (
+        ADXL355_2G.si("noise_density")
     )
     bias_instability: Annotated[float, Real("m/s2", "flicker of the bias, IEEE 952 B", min=0.0)] = ADXL355_2G.si(
         "bias_instability"
     )
     rate_random_walk: Annotated[float, Real("m/(s2.s^0.5)", "random walk of the bias, IEEE 952 K", min=0.0)] = 0.0
     turn_on_bias: Annotated[float, Real("m/s2", "standard deviation of the bias from run to run", min=0.0)] = 0.0
-    bandwidth: Annotated[float, Real("Hz", "analogue bandwidth before the Bartlett filter", min=1.0)] = ADXL355_2G.si(
-        "bandwidth"
-    )
+    bandwidth: Annotated[
+        float,
+        Real(
+            "Hz",
+            "analogue bandwidth ahead of the Bartlett filter, one pole; acts below sampling_frequency, not above, and "
+            "not in the decimator, whose first stage has its own",
+            min=1.0,
+        ),
+    ] = ADXL355_2G.si("bandwidth")
     sampling_frequency: Annotated[
         float, Real("Hz", "nominal rate of the first decimation, or of conversions", min=1.0, max=1e5)
     ] = _FASTEST
-    divider: Annotated[int, Integer("conversions per sample of the Bartlett filter", min=1, max=4096)] = 1
+    divider: Annotated[
+        int, Integer("conversions per sample of the Bartlett filter: 1 to 64, multiples of 31 to 1984", min=1, max=1984)
+    ] = 1
     output_data_rate: Annotated[int, OUTPUT_DATA_RATE] = OUTPUT_DATA_RATE.value("500_Hz")
     high_pass: Annotated[int, HIGH_PASS] = HIGH_PASS.value("none")
-    clock_error: Annotated[float, Real("1", "relative error of the part's clock", min=-0.1, max=0.1)] = (
-        BOARD.accelerometer_clock_error
-    )
+    clock_error: Annotated[
+        float, Real("1", "relative error of the part's clock, which starts with the run", min=-0.1, max=0.1)
+    ] = BOARD.accelerometer_clock_error
     clock_jitter: Annotated[float, Real("s", "standard deviation of the moment of a sample", min=0.0, max=1e-2)] = 0.0
     bias: Annotated[Vector3, Real("m/s2", "0 g offset at 25 degC")] = BOARD.accelerometer_bias
     bias_temperature_slope: Annotated[Vector3, Real("m/(s2.K)", "change of the offset with temperature")] = (
@@ -149,16 +157,22 @@ class AccelerometerParameters(NamedTuple):
     misalignment: Annotated[Vector3, Real("rad", "rotation vector of the triad in its package", min=-0.5, max=0.5)] = (
         ZERO3
     )
-    rectification: Annotated[Vector3, Real("s2/m", "offset by the square of the specific force")] = ZERO3
+    rectification: Annotated[
+        Vector3, Real("s2/m", "offset by the square of the whole specific force, at rest by g squared")
+    ] = ZERO3
     overload: Annotated[
-        float, Real("m/s2", "true specific force beyond which the part falls silent for half a millisecond", min=1e-3)
+        float,
+        Real("m/s2", "specific force along an axis beyond which the part is silent for half a millisecond", min=1e-3),
     ] = ADXL355_2G.si("overload")
-    self_test_response: Annotated[Vector3, Real("m/s2", "reading that the self-test adds")] = ADXL355_2G.of_each_axis(
-        "self_test_response"
+    self_test_response: Annotated[Vector3, Real("m/s2", "specific force that the self-test feigns")] = (
+        ADXL355_2G.of_each_axis("self_test_response")
     )
     self_test: Annotated[bool, Boolean("the self-test is on", tunable=True)] = False
     thermometer: ThermometerParameters = ThermometerParameters(
-        ADXL355_2G.si("thermometer.sensitivity"), ADXL355_2G.si("thermometer.code_at_25")
+        ADXL355_2G.si("thermometer.sensitivity"),
+        ADXL355_2G.si("thermometer.code_at_25"),
+        int(ADXL355_2G.si("thermometer.lowest_code")),
+        int(ADXL355_2G.si("thermometer.highest_code")),
     )
     thermal: ThermalParameters = ThermalParameters(
         ADXL355_2G.si("thermal.self_heating"), ADXL355_2G.si("thermal.warm_up")
@@ -169,10 +183,14 @@ class AccelerometerCoefficients(NamedTuple):
     """What follows from the parameters."""
 
     sensitivity: Annotated[Matrix3, Real("1", "reading of the row's axis by body specific force of the column")]
-    cubic: Annotated[tuple[float, float], Real("1", "gains of the nonlinearity, linear and cubic (s4/m2)")]
+    cubic: Annotated[
+        tuple[float, float, float], Real("1", "gains of the nonlinearity: linear, cubic (s4/m2), the cubic's largest")
+    ]
+    self_test: Annotated[Vector3, Real("m/s2", "specific force that the self-test feigns now")]
     sense_period: Annotated[float, Real("s", "time between inputs taken")]
     word_period: Annotated[float, Real("s", "time between register words")]
     low_pass_gain: Annotated[float, Real("1", "share of a step taken over in a sense period")]
+    low_pass_share: Annotated[float, Real("1", "weight of the latest input in the mean that is converted")]
     silence: Annotated[float, Integer("inputs that an overload silences the part for")]
     taps: Annotated[FourTaps, Real("1", "weights of the first stage")]
     decimation: Annotated[float, Integer("inputs taken per register word")]
@@ -182,8 +200,16 @@ class AccelerometerCoefficients(NamedTuple):
     instability_sigma: Annotated[float, Real("m/s2", "standard deviation of one Gauss-Markov process of the bias")]
 
 
+class RegisterWords(NamedTuple):
+    """What the data registers show at a time."""
+
+    code: Annotated[Vector3, Integer("data registers")]
+    over_range: Annotated[float, Boolean("a reading in them lies beyond the range")]
+    condition: Annotated[Vector3, Integer("0 well, 1 stuck, 2 without a valid reading")]
+
+
 class AccelerometerState(NamedTuple):
-    """The three axes."""
+    """The three axes; the `latest` words are in the registers once their latency is over, until then the `earlier`."""
 
     specific_force: Annotated[Vector3, Real("m/s2", "specific force as last sensed, behind the bandwidth")]
     before: Annotated[tuple[Vector3, Vector3, Vector3], Real("m/s2", "the three samples before, for the first stage")]
@@ -196,10 +222,8 @@ class AccelerometerState(NamedTuple):
     steady: Annotated[Vector3, Real("m/s2", "what the high-pass takes away")]
     sums: tuple[BartlettSums, BartlettSums, BartlettSums]
     words: Annotated[float, Real("1", "register words so far")]
-    pending: Annotated[Vector3, Integer("code on its way to the registers")]
-    code: Annotated[Vector3, Integer("data registers")]
-    over_range: Annotated[float, Boolean("a reading beyond the range")]
-    condition: Annotated[Vector3, Integer("0 well, 1 stuck, 2 without a valid reading")]
+    latest: RegisterWords
+    earlier: RegisterWords
 
 
 def _chosen(choice: Scalar, values: tuple[float, ...]) -> Scalar:
@@ -230,9 +254,11 @@ def accelerometer_coefficients(
             part.scale_error, part.cross_axis, part.nonorthogonality, part.misalignment, mounting
         ),
         cubic=cubic_gains(part.nonlinearity, part.range),
+        self_test=each_axis(lambda i: where(part.self_test > 0.5, part.self_test_response[i], 0.0)),
         sense_period=where(ideal > 0.5, STOPPED, 1.0 / frequency),
         word_period=decimation / frequency,
         low_pass_gain=low_pass_gain(part.bandwidth, 1.0 / frequency),
+        low_pass_share=low_pass_share(part.bandwidth, 1.0 / frequency),
         silence=round_half_up(_SILENCE * frequency),
         taps=delaying_taps(clip(rest - latency, 1.0, 2.0), FIRST_STAGE_CURVATURE),
         decimation=decimation,
@@ -255,26 +281,22 @@ def at_lever_arm(force: Vector3, rate: Vector3, angular_acceleration: Vector3, a
     )
 
 
-def _sensed(force: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients) -> Vector3:
-    """What the part makes of the true specific force at its place."""
+def _felt(
+    along: Vector3, force: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients
+) -> Vector3:
+    """What the part makes of the true specific force at its place, `along` its axes."""
     square = dot(force, force)
-    x, y, z = multiply(k.sensitivity, force)
+    x, y, z = along
     return (
-        bent(x * factor[0], k.cubic) + p.rectification[0] * square,
-        bent(y * factor[1], k.cubic) + p.rectification[1] * square,
-        bent(z * factor[2], k.cubic) + p.rectification[2] * square,
+        bent(x * factor[0], k.cubic) + p.rectification[0] * square + k.self_test[0],
+        bent(y * factor[1], k.cubic) + p.rectification[1] * square + k.self_test[1],
+        bent(z * factor[2], k.cubic) + p.rectification[2] * square + k.self_test[2],
     )
 
 
 def _converted(value: Scalar, p: AccelerometerParameters) -> Scalar:
-    """What the ADIS16354's converter makes of a specific force; it goes on to twice the range."""
+    """What the ADIS16354's converter makes of a specific force; it goes on to twice the range, an assumption."""
     return converted(clip(value, -2.0 * p.range, 2.0 * p.range), p.resolution)
-
-
-class _Words(NamedTuple):
-    code: Vector3
-    over_range: Scalar
-    condition: Vector3
 
 
 def _words(
@@ -284,11 +306,11 @@ def _words(
     time: Scalar,
     faults: tuple[FaultParameters, ...],
     draws: tuple[Scalar, ...],
-) -> _Words:
+) -> RegisterWords:
     """Register words of these readings, under faults."""
     codes, beyond, condition = [], [], []
     for axis in range(3):
-        value = values[axis] + where(p.self_test > 0.5, p.self_test_response[axis], 0.0)
+        value = values[axis]
         stuck: Scalar = 0.0
         dropped: Scalar = 0.0
         for fault in faults:
@@ -298,7 +320,7 @@ def _words(
         codes.append(where(dropped > 0.5, 0.0, where(stuck > 0.5, before[axis], fresh)))
         beyond.append(over_range(value, p.range))
         condition.append(condition_of(stuck, dropped))
-    return _Words(
+    return RegisterWords(
         (codes[0], codes[1], codes[2]),
         maximum(maximum(beyond[0], beyond[1]), beyond[2]),
         (condition[0], condition[1], condition[2]),
@@ -309,7 +331,7 @@ def initial_accelerometer(
     force: Vector3, offset: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients
 ) -> tuple[AccelerometerState, tuple[DelayLines, DelayLines, DelayLines]]:
     """The part after a long time at this specific force, without noise."""
-    sensed = _sensed(force, factor, p, k)
+    sensed = _felt(multiply(k.sensitivity, force), force, factor, p, k)
     n = k.decimation
     rising = scale(0.5 * n * (n - 1.0), sensed)
     read = add(sensed, offset)
@@ -317,7 +339,8 @@ def initial_accelerometer(
     steady = choose(passes, ZERO3, read)
     values = choose(passes, read, ZERO3)
     code = each_axis(lambda i: register_code(values[i], p.range, p.resolution, p.code_limit))
-    beyond = each_axis(lambda i: over_range(values[i], p.range))
+    each = each_axis(lambda i: over_range(values[i], p.range))
+    words = RegisterWords(code, maximum(maximum(each[0], each[1]), each[2]), ZERO3)
     taps = taps_of(p.filter, ACCELEROMETER_FILTER.value("bartlett_1"))
     filters = each_axis(lambda i: settled_bartlett(_converted(read[i], p), taps))
     state = AccelerometerState(
@@ -332,12 +355,16 @@ def initial_accelerometer(
         steady,
         (filters[0][0], filters[1][0], filters[2][0]),
         0.0,
-        code,
-        code,
-        maximum(maximum(beyond[0], beyond[1]), beyond[2]),
-        ZERO3,
+        words,
+        words,
     )
     return state, (filters[0][1], filters[1][1], filters[2][1])
+
+
+def registers(state: AccelerometerState, k: AccelerometerCoefficients) -> RegisterWords:
+    """What the data registers show now."""
+    words: RegisterWords = choose(state.samples >= k.latency, state.latest, state.earlier)
+    return words
 
 
 Sense = Callable[
@@ -349,15 +376,14 @@ def sense(
     state: AccelerometerState, force: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients
 ) -> AccelerometerState:
     """Step of the decimating part at the sampling frequency: an input enters the block, a due word the registers."""
-    x, y, z = _sensed(force, factor, p, k)
-    most = maximum(maximum(absolute(x), absolute(y)), absolute(z))
+    along = multiply(k.sensitivity, force)
+    most = maximum(maximum(absolute(along[0]), absolute(along[1])), absolute(along[2]))
     silent = where(most > p.overload, k.silence, maximum(state.silent - 1.0, 0.0))
     heard = where(silent > 0.5, 0.0, 1.0)
+    x, y, z = _felt(along, force, factor, p, k)
     sensed = (heard * x, heard * y, heard * z)
     f = four_tapped(k.taps, sensed, state.before)
     a, b, n = state.block, state.weighted_block, state.samples
-    due = n + 1.0 == k.latency
-    pending, code = state.pending, state.code
     return AccelerometerState(
         sensed,
         (sensed, state.before[0], state.before[1]),
@@ -369,11 +395,9 @@ def sense(
         state.mean,
         state.steady,
         state.sums,
-        state.words + where(due, 1.0, 0.0),
-        pending,
-        (where(due, pending[0], code[0]), where(due, pending[1], code[1]), where(due, pending[2], code[2])),
-        state.over_range,
-        state.condition,
+        state.words + where(n + 1.0 == k.latency, 1.0, 0.0),
+        state.latest,
+        state.earlier,
     )
 
 
@@ -381,9 +405,10 @@ def sense_bartlett(
     state: AccelerometerState, force: Vector3, factor: Vector3, p: AccelerometerParameters, k: AccelerometerCoefficients
 ) -> AccelerometerState:
     """Step of the part with Bartlett filters at four times its conversions: an input passes the bandwidth."""
-    before, true = state.specific_force, _sensed(force, factor, p, k)
-    passed = each_axis(lambda i: low_pass(before[i], true[i], k.low_pass_gain))
-    return state._replace(specific_force=passed, mean=each_axis(lambda i: 0.5 * (before[i] + passed[i])))
+    before, felt = state.specific_force, _felt(multiply(k.sensitivity, force), force, factor, p, k)
+    passed = each_axis(lambda i: low_pass(before[i], felt[i], k.low_pass_gain))
+    mean = each_axis(lambda i: before[i] + k.low_pass_share * (passed[i] - before[i]))
+    return state._replace(specific_force=passed, mean=mean)
 
 
 def register(
@@ -409,7 +434,7 @@ def register(
         rising.append(kept)
         steady.append(slow)
     time = state.words * k.word_period
-    words = _words((values[0], values[1], values[2]), state.pending, p, time, faults, draws[7:10])
+    latest = _words((values[0], values[1], values[2]), state.latest.code, p, time, faults, draws[7:10])
     return AccelerometerState(
         state.specific_force,
         state.before,
@@ -422,10 +447,8 @@ def register(
         (steady[0], steady[1], steady[2]),
         state.sums,
         state.words,
-        words.code,
-        state.code,
-        words.over_range,
-        words.condition,
+        latest,
+        state.latest,
     )
 
 
@@ -441,7 +464,7 @@ def sample(taps: int) -> Callable[..., tuple[AccelerometerState, tuple[DelayLine
         faults: tuple[FaultParameters, ...],
         draws: tuple[Scalar, ...],
     ) -> tuple[AccelerometerState, tuple[DelayLines, DelayLines, DelayLines]]:
-        late = p.clock_jitter * draws[6] * (2.0 / k.sense_period)
+        late = p.clock_jitter * draws[6] / ((1.0 - k.low_pass_share) * k.sense_period)
         values, sums, after = [], [], []
         for axis in range(3):
             jitter = (state.specific_force[axis] - state.mean[axis]) * late
@@ -451,16 +474,9 @@ def sample(taps: int) -> Callable[..., tuple[AccelerometerState, tuple[DelayLine
             sums.append(one_sums)
             after.append(one_lines)
         counted = state.words + 1.0
-        words = _words((values[0], values[1], values[2]), state.code, p, counted * k.word_period, faults, draws[7:10])
-        part = AccelerometerState(
-            *state[:9],
-            (sums[0], sums[1], sums[2]),
-            counted,
-            words.code,
-            words.code,
-            words.over_range,
-            words.condition,
-        )
+        time, before = counted * k.word_period, state.latest.code
+        words = _words((values[0], values[1], values[2]), before, p, time, faults, draws[7:10])
+        part = AccelerometerState(*state[:9], (sums[0], sums[1], sums[2]), counted, words, words)
         return part, (after[0], after[1], after[2])
 
     return step

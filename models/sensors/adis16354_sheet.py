@@ -7,11 +7,14 @@ PX4's ADIS16354.cpp.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from .datasheet import Choice, Datum, Part, Tolerance, not_given
 
 SAMPLING_FREQUENCY = Datum(819.2, "Hz", "PX4; sister Table 17, SMPL_PRD 0x0001", "driver")
 SUPPLY_WEIGHT = Datum(1.8315, "mV/LSB", "ADIS16354A.h; sister register map", "driver")
 AUXILIARY_WEIGHT = Datum(0.6105, "mV/LSB", "ADIS16354A.h; sister register map", "driver")
+SUPPLY = (Datum(4.75, "V", "sister Table 1", "sister"), Datum(5.25, "V", "sister Table 1", "sister"))
 
 _ONE_CLOCK = "adis16354.clock_error"
 _CLOCK = Tolerance(
@@ -20,6 +23,12 @@ _CLOCK = Tolerance(
 _THERMOMETER = {
     "thermometer.sensitivity": Datum(0.1453, "degC/LSB", "ADIS16354A.h; sister Table 1", "driver"),
     "thermometer.code_at_25": Datum(0.0, "LSB", "ADIS16354A.h; sister Table 1", "driver"),
+    "thermometer.lowest_code": Datum(
+        -2048.0, "LSB", "ADIS16354A.h; sister Table 6, 12 bits in two's complement", "driver"
+    ),
+    "thermometer.highest_code": Datum(
+        2047.0, "LSB", "ADIS16354A.h; sister Table 6, 12 bits in two's complement", "driver"
+    ),
 }
 _THERMAL = {
     "thermal.self_heating": Datum(3.3, "K", "33 mA at 5 V (sister Table 1) through 20 K/W", "assumption"),
@@ -53,7 +62,9 @@ GYROS_300 = Part(
         "rectification": not_given("deg/s/g2"),
         "autonull": Choice("none", "sister Table 15: only on command", "sister"),
         "null_resolution": Datum(0.018315, "deg/s/LSB", "sister register map, xGYRO_OFF", "sister"),
-        "self_test_response": Datum(52.97, "deg/s", "sister Table 1, 723 LSB at +-300 deg/s", "sister"),
+        "self_test_response": Datum(
+            52.97, "deg/s", "sister Table 1, 723 LSB at +-300 deg/s, 432 to 1105", "sister", limits=(31.65, 80.95)
+        ),
         **_THERMOMETER,
         **_THERMAL,
     },
@@ -85,6 +96,21 @@ GYROS_75 = GYROS_300.varied(
         "resolution": Datum(0.018315, "deg/s/LSB", "sister Table 1, 0.01832 printed; a quarter of 0.07326", "sister"),
     },
 )
+
+
+class GyroRange(NamedTuple):
+    """A range of the gyros, and the smallest M of the 2^M taps that go with it."""
+
+    range: Datum
+    least_exponent: Datum
+
+
+GYRO_RANGES = (
+    GyroRange(GYROS_75.datum("range"), Datum(4, "1", "sister, SENS/AVG", "sister")),
+    GyroRange(GYROS_150.datum("range"), Datum(2, "1", "sister, SENS/AVG", "sister")),
+    GyroRange(GYROS_300.datum("range"), Datum(0, "1", "sister, SENS/AVG", "sister")),
+)
+"""All that the part offers, the narrowest first."""
 
 ACCELEROMETERS = Part(
     "ADIS16354 accelerometers",

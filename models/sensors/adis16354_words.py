@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from ..record import Boolean
-from ..scalar import Scalar, where
-from .adis16354_sheet import ACCELEROMETERS, AUXILIARY_WEIGHT, GYROS_300, SUPPLY_WEIGHT
+from ..scalar import Scalar, both, clip, minimum, round_half_up, where
+from .adis16354_sheet import ACCELEROMETERS, AUXILIARY_WEIGHT, GYRO_RANGES, GYROS_300, SUPPLY, SUPPLY_WEIGHT
 from .datasheet import REFERENCE_TEMPERATURE
 from .words import field, flags, nearest_signed, nearest_unsigned, pattern, signed
 
@@ -97,6 +97,12 @@ def status_word(status: Status) -> Scalar:
     return 2.0**8 * flags(status[:_HIGH_BYTE]) + flags(status[_HIGH_BYTE:])
 
 
+def supply_errors(supply: Scalar) -> tuple[Scalar, Scalar]:
+    """STATUS bits 0 and 1 of a supply in V, each 0 or 1: below 4.75 V, above 5.25 V."""
+    lowest, highest = SUPPLY
+    return where(supply < lowest.si, 1.0, 0.0), where(supply > highest.si, 1.0, 0.0)
+
+
 def error_or_alarm(word: Scalar) -> Scalar:
     """EA bit of the output words: 1.0 where any bit of STATUS is set (said so for the sister ADIS16362), else 0.0."""
     return where(word > 0.0, 1.0, 0.0)
@@ -114,7 +120,29 @@ def sensitivity_average_fields(word: Scalar) -> tuple[Scalar, Scalar]:
 
 def least_exponent(range_code: Scalar) -> Scalar:
     """Smallest M that a range may be used with: 0 for +-300, 2 for +-150, 4 for +-75 deg/s (sister Rev. B)."""
-    return where(range_code > 3.0, 0.0, where(range_code > 1.5, 2.0, 4.0))
+    at_75, at_150, at_300 = (offered.least_exponent.si for offered in GYRO_RANGES)
+    return where(range_code > 3.0, at_300, where(range_code > 1.5, at_150, at_75))
+
+
+def nearest_range(wanted: Scalar, exponent: Scalar) -> Scalar:
+    """The range (rad/s), of those that 2^M taps go with, nearest to the wanted one."""
+    wider = GYRO_RANGES[-1].range.si
+    nearest: Scalar = wider
+    for offered in reversed(GYRO_RANGES[:-1]):
+        range_ = offered.range.si
+        is_nearer = both(exponent >= offered.least_exponent.si, wanted < 0.5 * (range_ + wider))
+        nearest, wider = where(is_nearer, range_, nearest), range_
+    return nearest
+
+
+def ranges_in_words() -> str:
+    """What SENS/AVG offers, for people."""
+    offers = []
+    for offered in reversed(GYRO_RANGES):
+        taps = 2 ** int(offered.least_exponent.si)
+        fewest = f" with {taps} taps or more" if taps > 1 else ""
+        offers.append(f"+-{offered.range.value:g} {offered.range.unit}{fewest}")
+    return ", ".join(offers)
 
 
 def gyro_weight(range_code: Scalar) -> Scalar:
@@ -134,6 +162,16 @@ def sample_period(word: Scalar) -> Scalar:
     """
     base = where(field(word, 7, 1) > 0.5, SLOW_TIME_BASE, FAST_TIME_BASE)
     return base * (field(word, 0, 7) + 1.0)
+
+
+def nearest_divider(wanted: Scalar) -> Scalar:
+    """The divider of 819.2 SPS, of the whole ones that SMPL_PRD can make, nearest to a wanted one.
+
+    Period over that of 0x01: (N_S + 1)/2 with the fast time base, 31 times that with the slow one, N_S up to 127, and
+    none faster than 0x01. Whole are 1 to 64 and the multiples of 31 up to 1984, 0.413 SPS.
+    """
+    slow = clip(31.0 * round_half_up(wanted / 31.0), 93.0, 1984.0)
+    return where(wanted > 78.5, slow, minimum(wanted, 64.0))
 
 
 def gyro_offset_word(rate: Scalar) -> Scalar:

@@ -15,8 +15,10 @@ HIGH_PASS_CORNERS = tuple(
     Datum(value, "1", "Rev. D p. 27, corner over output data rate, codes 001 to 110")
     for value in (24.7e-4, 6.2084e-4, 1.5545e-4, 0.3862e-4, 0.0954e-4, 0.0238e-4)
 )
-_SELF_TEST_XY = Datum(0.3, "g", "Rev. D Table 2, X and Y, typical")
-_SELF_TEST_Z = Datum(1.5, "g", "Rev. D Table 2, Z, typical")
+_SELF_TEST_XY = Datum(0.3, "g", "Rev. D Table 2, X and Y, typical and limits", limits=(0.1, 0.6))
+_SELF_TEST_Z = Datum(1.5, "g", "Rev. D Table 2, Z, typical and limits", limits=(0.5, 3.0))
+_OVERLOAD_8G = Datum(8.0, "g", "Rev. D p. 24, +-25 %", limits=(6.0, 10.0))
+_OVERLOAD_16G = Datum(16.0, "g", "Rev. D p. 24, +-25 % as at +-2 g", limits=(12.0, 20.0))
 
 ADXL355_2G = Part(
     "ADXL355 +-2 g",
@@ -44,10 +46,12 @@ ADXL355_2G = Part(
         "nonorthogonality": not_given("deg", "in the cross-axis sensitivity"),
         "misalignment": not_given("deg", "in the cross-axis sensitivity; how it is soldered is the user's"),
         "rectification": not_given("g/g2", "only a limit is given, 0.4 g at 2.5 g rms, which is overload"),
-        "overload": Datum(8.0, "g", "Rev. D p. 24, +-25 %"),
+        "overload": _OVERLOAD_8G,
         "self_test_response": (_SELF_TEST_XY, _SELF_TEST_XY, _SELF_TEST_Z),
         "thermometer.sensitivity": Datum(-9.05, "LSB/degC", "Rev. D Table 2"),
         "thermometer.code_at_25": Datum(1885.0, "LSB", "Rev. D Table 2; Rev. 0 has 1852"),
+        "thermometer.lowest_code": Datum(0.0, "LSB", "Rev. D, registers TEMP2 and TEMP1, 12 bits unsigned"),
+        "thermometer.highest_code": Datum(4095.0, "LSB", "Rev. D, registers TEMP2 and TEMP1, 12 bits unsigned"),
         "thermal.self_heating": Datum(0.1, "K", "0.66 mW (Rev. D Table 2) through 150 K/W", "assumption"),
         "thermal.warm_up": Datum(60.0, "s", "small board in still air", "assumption"),
     },
@@ -71,7 +75,7 @@ ADXL355_4G = ADXL355_2G.varied(
         "resolution": Datum(128_000.0, "LSB/g", "Rev. D Table 2"),
         "noise_density": Datum(25.0, "ug/rtHz", "not given at +-4 g; Rev. D Table 2 at +-8 g", "assumption"),
         "nonlinearity": Datum(0.4, "% FS largest", "not given; between 0.1 at +-2 g and 1.6 at +-8 g", "assumption"),
-        "overload": Datum(16.0, "g", "Rev. D p. 24"),
+        "overload": _OVERLOAD_16G,
     },
 )
 ADXL355_8G = ADXL355_2G.varied(
@@ -81,6 +85,6 @@ ADXL355_8G = ADXL355_2G.varied(
         "resolution": Datum(64_000.0, "LSB/g", "Rev. D Table 2"),
         "noise_density": Datum(25.0, "ug/rtHz", "Rev. D Table 2, +-8 g, one-sided"),
         "nonlinearity": Datum(1.6, "% FS largest", "Rev. D Table 2, +-8 g; largest deviation assumed"),
-        "overload": Datum(16.0, "g", "Rev. D p. 24"),
+        "overload": _OVERLOAD_16G,
     },
 )

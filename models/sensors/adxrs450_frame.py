@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from ..record import Boolean
-from ..scalar import Scalar, absolute, floor, where
-from .adxrs450_sheet import ADXRS450, CONTINUOUS_SELF_TEST, THERMOMETER_ZERO
+from ..scalar import Scalar, absolute, either, floor, where
+from .adxrs450_sheet import ADXRS450, CONTINUOUS_SELF_TEST, SUPPLY, THERMOMETER_ZERO
 from .datasheet import CELSIUS_ZERO
 from .words import field, flags, nearest_signed, odd, ones, parity, pattern, signed
 
@@ -98,6 +98,15 @@ def self_test_invalidates(self_test: Scalar, tolerance: float = SELF_TEST_VALID_
     Rev. 0 contradicts itself: +-1280 LSB in Table 1, the default here, +-1856 in the text.
     """
     return where(absolute(self_test - SELF_TEST_NOMINAL) > tolerance, 1.0, 0.0)
+
+
+def power_fault(supply: Scalar) -> Scalar:
+    """Fault bit PWR, 0 or 1, of a supply in V: set outside 3.15 to 5.25 V (Rev. 0 Table 1).
+
+    The part watches its 3 V regulator (2.77 to 3.3 V); that this leaves its limits where the supply does is assumed.
+    """
+    lowest, highest = SUPPLY
+    return where(either(supply < lowest.si, supply > highest.si), 1.0, 0.0)
 
 
 def data_status(checking: Scalar, invalid: Scalar) -> Scalar:

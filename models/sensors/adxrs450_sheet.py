@@ -10,6 +10,7 @@ from .datasheet import Choice, Datum, Part, Tolerance, not_given
 
 NULL_ACCURACY = Datum(3.0, "deg/s", "Rev. 0 Table 1, typical column, over temperature")
 CONTINUOUS_SELF_TEST = Datum(2559.0, "LSB", "Rev. 0 Table 1, in the register LOCST")
+SUPPLY = (Datum(3.15, "V", "Rev. 0 Table 1, lowest supply"), Datum(5.25, "V", "Rev. 0 Table 1, highest supply"))
 THERMOMETER_ZERO = Datum(45.0, "degC", "Rev. 0 Table 1, temperature of 0 LSB")
 
 _THREE_SIGMA = "printed as typical, but that of the sensitivity is three sigma of its histogram"
@@ -44,6 +45,8 @@ ADXRS450 = Part(
         "self_test_response": not_given("deg/s", "the self-test shows in LOCST, not in the rate"),
         "thermometer.sensitivity": Datum(5.0, "LSB/degC", "Rev. 0 Table 1"),
         "thermometer.code_at_25": Datum(-100.0, "LSB", "Rev. 0 Table 1: 0 LSB at 45 degC, 5 LSB/degC", "calculated"),
+        "thermometer.lowest_code": Datum(-512.0, "LSB", "Rev. 0, register TEM, 10 bits in two's complement"),
+        "thermometer.highest_code": Datum(511.0, "LSB", "Rev. 0, register TEM, 10 bits in two's complement"),
         "thermal.self_heating": Datum(4.5, "K", "30 mW (Rev. 0 Table 1) through 150 K/W", "assumption"),
         "thermal.warm_up": Datum(60.0, "s", "small board in still air", "assumption"),
     },

@@ -103,12 +103,13 @@ def in_si(value: float, unit: str) -> float:
 
 
 class Datum(NamedTuple):
-    """A number of a datasheet."""
+    """A number of a datasheet, with the lowest and highest that pieces may have where it prints them."""
 
     value: float
     unit: str
     source: str
     confidence: str = "datasheet"
+    limits: tuple[float, float] | None = None
 
     @property
     def si(self) -> float:
@@ -118,7 +119,8 @@ class Datum(NamedTuple):
     @property
     def text(self) -> str:
         """The number as the datasheet has it."""
-        return f"{self.value:.10g}" if self.unit == "1" else f"{self.value:.10g} {self.unit}"
+        within = f" ({self.limits[0]:g} to {self.limits[1]:g})" if self.limits else ""
+        return f"{self.value:.10g}" if self.unit == "1" else f"{self.value:.10g} {self.unit}{within}"
 
 
 class Choice(NamedTuple):
@@ -161,6 +163,11 @@ Number = Datum | Choice | tuple[Datum, Datum, Datum]
 """The same on all axes, or one for each."""
 
 Origin = Datum | Choice | Tolerance
+
+
+def differs_from_piece_to_piece(origin: Origin) -> bool:
+    """Whether a specimen has its own value."""
+    return isinstance(origin, Tolerance) or (isinstance(origin, Datum) and origin.limits is not None)
 
 
 class Part(NamedTuple):

@@ -133,8 +133,21 @@ def _deviation(tolerance: Tolerance, number: int, name: str) -> float:
     return tolerance.mean + next(x for x in drawn if abs(x) <= limit)
 
 
+def _within_limits(datum: Datum, limits: tuple[float, float], number: int, name: str) -> float:
+    """What piece `number` has, in the datum's unit: as likely below the typical number as above, evenly to the limits.
+
+    That it is even is an assumption; the sheets print typical number and limits alone.
+    """
+    share = 2.0 * ((philox4x64((0, 0, 0, 0), (number, stream_of(name)))[0] >> 11) + 0.5) * 2.0**-53
+    low, high = limits
+    return low + share * (datum.value - low) if share < 1.0 else datum.value + (share - 1.0) * (high - datum.value)
+
+
 def specimen(name: str, number: int) -> dict[str, float]:
-    """What piece `number` of a device has of its own: errors drawn from its tolerances, all zero for number 0."""
+    """What piece `number` of a device has of its own: errors drawn from its tolerances, all zero for number 0.
+
+    Pieces from 1 on also have their own of the numbers that the sheet prints with limits.
+    """
     if not 0 <= number < 2**31:
         raise UnknownDeviceError(f"there is no specimen {number} of {name} (allowed: 0 to {2**31 - 1})")
     drawn = {}
@@ -146,6 +159,8 @@ def specimen(name: str, number: int) -> dict[str, float]:
             drawn[field.name] = (
                 0.0 if own or number == 0 else in_si(_deviation(origin, number, field.name), origin.unit)
             )
+        elif isinstance(origin, Datum) and origin.limits is not None and number > 0:
+            drawn[field.name] = in_si(_within_limits(origin, origin.limits, number, field.name), origin.unit)
     return drawn
 
 

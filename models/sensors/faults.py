@@ -61,16 +61,16 @@ def condition_of(stuck: Scalar, dropped: Scalar) -> Scalar:
     return where(dropped > 0.5, 2.0, where(stuck > 0.5, 1.0, 0.0))
 
 
-def is_active(fault: FaultParameters, channel: int, time: Scalar) -> Scalar:
-    """Whether this channel (from 0) suffers from the fault at this time (s) of the run."""
-    return both(fault.channel == channel + 1, both(time >= fault.start, time < fault.end))
+def is_active(fault: FaultParameters, time: Scalar) -> Scalar:
+    """Whether the fault's channel suffers from it at this time (s) of the run."""
+    return both(time >= fault.start, time < fault.end)
 
 
 def faulted(
     value: Scalar, full_scale: Scalar, fault: FaultParameters, channel: int, time: Scalar, draw: Scalar
 ) -> Faulted:
     """The reading of a channel (from 0) under a fault; `draw` is a standard normal."""
-    kind = where(is_active(fault, channel, time), fault.kind, _NONE)
+    kind = where(both(fault.channel == channel + 1, is_active(fault, time)), fault.kind, _NONE)
     size = fault.size * full_scale
     spike = where(absolute(draw) > _SPIKE, where(draw > 0.0, size, -size), 0.0)
     added = where(kind == _SPIKING, spike, 0.0)

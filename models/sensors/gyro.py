@@ -1,7 +1,7 @@
 """Three single-axis digital gyros, each at its own clock: ADXRS450 (or 453), or the gyros of an ADIS16354.
 
-The signal's way: sensitivity and mounting, bandwidth, temperature, g-sensitivity, nonlinearity; white noise; digital
-filter; offset, fault, range, register word. Two digital filters are offered:
+The signal's way: sensitivity and mounting, temperature, nonlinearity, g-sensitivity, self-test; bandwidth; white noise;
+digital filter; offset, fault, range, register word. Two digital filters are offered:
 
 * ``cic``, the ADXRS450's sinc^2 over 128/f0: sensed at f0/8, register updated at f0/32;
 * ``bartlett_1`` to ``bartlett_64``, the ADIS16354's at every sample, four inputs a conversion.
@@ -17,7 +17,7 @@ from ..scalar import Scalar, clip, either, maximum, round_half_up, where
 from ..system import STOPPED
 from ..vectors import dot, each_axis, matrix_product
 from .adxrs450_sheet import ADXRS450
-from .bandwidth import low_pass, low_pass_gain
+from .bandwidth import low_pass, low_pass_gain, low_pass_share
 from .bias_instability import SIGMA_PER_INSTABILITY
 from .board import BOARD
 from .digital_filter import (
@@ -44,6 +44,8 @@ from .white_noise import block_sums, sample_deviation
 
 SAMPLES_PER_REGISTER = 32
 """ADXRS450: f0 over the register's rate (Rev. 0 p. 11); the window is four times as long."""
+WORDS_PER_WINDOW = 4
+"""Register words that the CIC's window reaches over."""
 SENSES_PER_REGISTER = 4
 SAMPLES_PER_SENSE = SAMPLES_PER_REGISTER // SENSES_PER_REGISTER
 GYRO_FILTER = Enumeration(
@@ -53,10 +55,10 @@ AUTONULL = Enumeration(
     "Autonull",
     (
         Item("none", "offset registers stay zero"),
-        Item("automatic", "one reading at the start is taken as offset (ADIS16354, COMMAND bit 0)"),
-        Item("precision", "the mean of the first 30 s is taken as offset (ADIS16354, COMMAND bit 4)"),
+        Item("automatic", "one reading is taken as offset (ADIS16354, COMMAND bit 0)"),
+        Item("precision", "the mean of 30 s is taken as offset (ADIS16354, COMMAND bit 4)"),
     ),
-    "bias null of the part at power-up",
+    "bias null of the part at power-up, as soon as its filter is full of readings with noise",
 )
 NULL_DURATION = 30.0
 """s of the ADIS16354's precision null."""
@@ -75,8 +77,8 @@ class GyroParameters(NamedTuple):
     code_limit: Annotated[float, Integer("codes run from minus this to one less", min=2, max=2**31 - 1)] = int(
         ADXRS450.si("code_limit")
     )
-    noise_density: Annotated[float, Real("rad/(s.Hz^0.5)", "white rate noise, one-sided", min=0.0)] = ADXRS450.si(
-        "noise_density"
+    noise_density: Annotated[float, Real("rad/(s.Hz^0.5)", "white rate noise, one-sided, of each gyro", min=0.0)] = (
+        ADXRS450.si("noise_density")
     )
     bias_instability: Annotated[float, Real("rad/s", "flicker of the bias, IEEE 952 B", min=0.0, display="deg/h")] = (
         ADXRS450.si("bias_instability")
@@ -85,19 +87,27 @@ class GyroParameters(NamedTuple):
     turn_on_bias: Annotated[
         float, Real("rad/s", "standard deviation of the bias from run to run", min=0.0, display="deg/s")
     ] = 0.0
-    bandwidth: Annotated[float, Real("Hz", "analogue bandwidth before the digital filter", min=1.0)] = ADXRS450.si(
-        "bandwidth"
-    )
+    bandwidth: Annotated[
+        float,
+        Real(
+            "Hz",
+            "analogue bandwidth ahead of the digital filter, one pole; acts below f0/32 (CIC), sampling_frequency "
+            "(Bartlett), not above",
+            min=1.0,
+        ),
+    ] = ADXRS450.si("bandwidth")
     resonator_frequency: Annotated[
         float, Real("Hz", "nominal f0, from which every rate of the part with a CIC follows", min=1e3, max=1e5)
     ] = ADXRS450.si("resonator_frequency")
     sampling_frequency: Annotated[
         float, Real("Hz", "nominal conversion rate of the part with a Bartlett filter", min=1.0, max=1e5)
     ] = ADXRS450.si("sampling_frequency")
-    divider: Annotated[int, Integer("conversions per sample of the Bartlett filter", min=1, max=4096)] = 1
-    clock_error: Annotated[Vector3, Real("1", "relative error of the part's clock", min=-0.25, max=0.25)] = (
-        BOARD.gyro_clock_error
-    )
+    divider: Annotated[
+        int, Integer("conversions per sample of the Bartlett filter: 1 to 64, multiples of 31 to 1984", min=1, max=1984)
+    ] = 1
+    clock_error: Annotated[
+        Vector3, Real("1", "relative error of the part's clock, which starts with the run", min=-0.25, max=0.25)
+    ] = BOARD.gyro_clock_error
     clock_jitter: Annotated[float, Real("s", "standard deviation of the moment of a sample", min=0.0, max=1e-2)] = 0.0
     bias: Annotated[Vector3, Real("rad/s", "null offset at 25 degC", display="deg/s")] = BOARD.gyro_bias
     bias_temperature_slope: Annotated[Vector3, Real("rad/(s.K)", "change of the offset with temperature")] = (
@@ -149,21 +159,24 @@ class GyroParameters(NamedTuple):
     g_sensitivity: Annotated[Matrix3, Real("rad.s/m", "reading of the row's gyro by specific force of the column")] = (
         BOARD.gyro_g_sensitivity
     )
-    rectification: Annotated[Vector3, Real("rad.s3/m2", "offset by the square of the specific force")] = (
-        ADXRS450.of_each_axis("rectification")
-    )
+    rectification: Annotated[
+        Vector3, Real("rad.s3/m2", "offset by the square of the whole specific force, at rest by g squared")
+    ] = ADXRS450.of_each_axis("rectification")
     autonull: Annotated[int, AUTONULL] = AUTONULL.value("none")
     null_resolution: Annotated[float, Real("rad/s", "one LSB of the offset registers", min=1e-12, display="deg/s")] = (
         ADXRS450.si("null_resolution")
     )
-    self_test_response: Annotated[Vector3, Real("rad/s", "reading that the self-test adds", display="deg/s")] = (
+    self_test_response: Annotated[Vector3, Real("rad/s", "rate that the self-test feigns", display="deg/s")] = (
         0.0,
         0.0,
         0.0,
     )
     self_test: Annotated[bool, Boolean("the self-test is on", tunable=True)] = False
     thermometer: ThermometerParameters = ThermometerParameters(
-        ADXRS450.si("thermometer.sensitivity"), ADXRS450.si("thermometer.code_at_25")
+        ADXRS450.si("thermometer.sensitivity"),
+        ADXRS450.si("thermometer.code_at_25"),
+        int(ADXRS450.si("thermometer.lowest_code")),
+        int(ADXRS450.si("thermometer.highest_code")),
     )
     thermal: ThermalParameters = ThermalParameters(ADXRS450.si("thermal.self_heating"), ADXRS450.si("thermal.warm_up"))
 
@@ -173,13 +186,18 @@ class GyroCoefficients(NamedTuple):
 
     sensitivity: Annotated[Matrix3, Real("1", "reading of the row's gyro by body rate of the column")]
     g_sensitivity: Annotated[Matrix3, Real("rad.s/m", "reading of the row's gyro by body specific force")]
-    cubic: Annotated[tuple[float, float], Real("1", "gains of the nonlinearity, linear and cubic (s2/rad2)")]
+    cubic: Annotated[
+        tuple[float, float, float], Real("1", "gains of the nonlinearity: linear, cubic (s2/rad2), the cubic's largest")
+    ]
+    self_test: Annotated[Vector3, Real("rad/s", "rate that the self-test feigns now", display="deg/s")]
     sense_period: Annotated[Vector3, Real("s", "time between inputs taken")]
     word_period: Annotated[Vector3, Real("s", "time between register words")]
     low_pass_gain: Annotated[Vector3, Real("1", "share of a step taken over in a sense period")]
+    low_pass_share: Annotated[Vector3, Real("1", "weight of the latest input in the mean that is converted")]
     sample_deviation: Annotated[Vector3, Real("rad/s", "white noise of a sample")]
     instability_sigma: Annotated[float, Real("rad/s", "standard deviation of one Gauss-Markov process of the bias")]
     null_words: Annotated[Vector3, Integer("register words averaged for the bias null, 0: none")]
+    null_begin: Annotated[float, Integer("first of these words: the first whose filter holds nothing but noisy inputs")]
     senses: Annotated[float, Integer("inputs taken per register word")]
 
 
@@ -194,8 +212,9 @@ class NullState(NamedTuple):
 class GyroState(NamedTuple):
     """One gyro."""
 
-    rate: Annotated[float, Real("rad/s", "rate behind the analogue bandwidth")]
-    sensed: Annotated[float, Real("rad/s", "rate and what specific force adds to it, as last sensed")]
+    sensed: Annotated[
+        float, Real("rad/s", "rate and what specific force adds to it, as last sensed, behind the bandwidth")
+    ]
     block: Annotated[BlockSums, Real("rad/s", "sums of the block under way")]
     windows: Annotated[OverlappedWindows, Real("rad/s", "partial sums of the windows under way")]
     mean: Annotated[float, Real("rad/s", "mean over the last block, or since the input before")]
@@ -210,6 +229,7 @@ class GyroState(NamedTuple):
 def gyro_coefficients(gyro: GyroParameters, mounting: Matrix3, ideal: Any) -> GyroCoefficients:
     """Coefficients of the triad; an ideal one is read directly, its clocks stand still."""
     perfect, is_cic = ideal > 0.5, gyro.filter == GYRO_FILTER.value("cic")
+    window = 2.0 * taps_of(gyro.filter, GYRO_FILTER.value("bartlett_1")) - 1.0
     # the converter samples noise of its full rate, however seldom it is read
     nominal = where(is_cic, gyro.resonator_frequency, gyro.sampling_frequency)
     frequency = each_axis(lambda i: nominal * (1.0 + gyro.clock_error[i]))
@@ -224,12 +244,15 @@ def gyro_coefficients(gyro: GyroParameters, mounting: Matrix3, ideal: Any) -> Gy
         ),
         g_sensitivity=matrix_product(gyro.g_sensitivity, mounting),
         cubic=cubic_gains(gyro.nonlinearity, gyro.range),
+        self_test=each_axis(lambda i: where(gyro.self_test > 0.5, gyro.self_test_response[i], 0.0)),
         sense_period=each_axis(lambda i: where(perfect, STOPPED, period[i])),
         word_period=word,
         low_pass_gain=each_axis(lambda i: low_pass_gain(gyro.bandwidth, period[i])),
+        low_pass_share=each_axis(lambda i: low_pass_share(gyro.bandwidth, period[i])),
         sample_deviation=each_axis(lambda i: sample_deviation(gyro.noise_density, frequency[i])),
         instability_sigma=gyro.bias_instability * SIGMA_PER_INSTABILITY,
         null_words=each_axis(lambda i: where(idle, 0.0, where(precise, round_half_up(NULL_DURATION / word[i]), 1.0))),
+        null_begin=where(is_cic, float(WORDS_PER_WINDOW), window),
         senses=senses,
     )
 
@@ -239,13 +262,11 @@ def initial_null(words: Scalar) -> NullState:
     return NullState(0.0, 0.0, where(words < 0.5, 1.0, 0.0))
 
 
-def _sensed(
-    axis: int, gyro: GyroState, rate: Vector3, force: Vector3, scale: Scalar, p: GyroParameters, k: GyroCoefficients
-) -> tuple[Scalar, Scalar]:
-    """The rate behind the bandwidth, and what the part makes of it and of the specific force."""
-    passed = low_pass(gyro.rate, dot(k.sensitivity[axis], rate), k.low_pass_gain[axis])
+def _felt(axis: int, rate: Vector3, force: Vector3, scale: Scalar, p: GyroParameters, k: GyroCoefficients) -> Scalar:
+    """What the part makes of the true rate and specific force, ahead of its bandwidth."""
+    turned = bent(dot(k.sensitivity[axis], rate) * scale, k.cubic)
     pushed = dot(k.g_sensitivity[axis], force) + p.rectification[axis] * dot(force, force)
-    return passed, bent(passed * scale, k.cubic) + pushed
+    return turned + pushed + k.self_test[axis]
 
 
 def _word(
@@ -262,7 +283,6 @@ def _word(
     words = gyro.words + 1.0
     time = words * k.word_period[axis]
     value = value + offset + gyro.null.offset * p.null_resolution
-    value = value + where(p.self_test > 0.5, p.self_test_response[axis], 0.0)
     stuck: Scalar = 0.0
     dropped: Scalar = 0.0
     for fault in faults:
@@ -278,15 +298,16 @@ def nulled(
     null: NullState, code: Scalar, words: Scalar, axis: int, p: GyroParameters, k: GyroCoefficients
 ) -> NullState:
     """The bias null after one more word: offset = -mean, in whole LSB of the offset register."""
-    total = null.sum + where(null.done > 0.5, 0.0, code)
-    ends = where(null.done > 0.5, 0.0, where(words >= k.null_words[axis], 1.0, 0.0))
+    count = words - k.null_begin + 1.0
+    total = null.sum + where(either(null.done > 0.5, count < 0.5), 0.0, code)
+    ends = where(null.done > 0.5, 0.0, where(count >= k.null_words[axis], 1.0, 0.0))
     steps = round_half_up(-(total / maximum(k.null_words[axis], 1.0)) * (p.resolution / p.null_resolution))
     offset = clip(steps, *NULL_CODES)
     return NullState(total, where(ends > 0.5, offset, null.offset), where(ends > 0.5, 1.0, null.done))
 
 
 def _converted(value: Scalar, p: GyroParameters) -> Scalar:
-    """What the ADIS16354's converter makes of a rate; it goes on to twice the range."""
+    """What the ADIS16354's converter makes of a rate; it goes on to twice the range, an assumption."""
     return converted(clip(value, -2.0 * p.range, 2.0 * p.range), p.resolution)
 
 
@@ -300,17 +321,13 @@ def initial_gyro(
     k: GyroCoefficients,
 ) -> tuple[GyroState, DelayLines]:
     """The gyro after a long time at these inputs, without noise."""
-    passed = dot(k.sensitivity[axis], rate)
-    pushed = dot(k.g_sensitivity[axis], force) + p.rectification[axis] * dot(force, force)
-    sensed = bent(passed * scale, k.cubic) + pushed
+    sensed = _felt(axis, rate, force, scale, p, k)
     code = register_code(sensed + offset, p.range, p.resolution, p.code_limit)
     settled = settled_windows(sensed, float(SAMPLES_PER_REGISTER))
     taps = taps_of(p.filter, GYRO_FILTER.value("bartlett_1"))
     sums, lines = settled_bartlett(_converted(sensed + offset, p), taps)
     beyond = over_range(sensed + offset, p.range)
-    state = GyroState(
-        passed, sensed, EMPTY, settled, sensed, sums, 0.0, initial_null(k.null_words[axis]), code, beyond, 0.0
-    )
+    state = GyroState(sensed, EMPTY, settled, sensed, sums, 0.0, initial_null(k.null_words[axis]), code, beyond, 0.0)
     return state, lines
 
 
@@ -326,9 +343,9 @@ def sense(axis: int) -> Sense:
     def step(
         gyro: GyroState, rate: Vector3, force: Vector3, scale: Scalar, p: GyroParameters, k: GyroCoefficients
     ) -> GyroState:
-        passed, sensed = _sensed(axis, gyro, rate, force, scale, p, k)
+        sensed = low_pass(gyro.sensed, _felt(axis, rate, force, scale, p, k), k.low_pass_gain[axis])
         block = with_samples(gyro.block, gyro.sensed, sensed, float(SAMPLES_PER_SENSE))
-        return GyroState(passed, sensed, block, *gyro[3:])
+        return GyroState(sensed, block, *gyro[2:])
 
     return step
 
@@ -339,8 +356,9 @@ def sense_bartlett(axis: int) -> Sense:
     def step(
         gyro: GyroState, rate: Vector3, force: Vector3, scale: Scalar, p: GyroParameters, k: GyroCoefficients
     ) -> GyroState:
-        passed, sensed = _sensed(axis, gyro, rate, force, scale, p, k)
-        return GyroState(passed, sensed, gyro.block, gyro.windows, 0.5 * (gyro.sensed + sensed), *gyro[5:])
+        sensed = low_pass(gyro.sensed, _felt(axis, rate, force, scale, p, k), k.low_pass_gain[axis])
+        mean = gyro.sensed + k.low_pass_share[axis] * (sensed - gyro.sensed)
+        return GyroState(sensed, gyro.block, gyro.windows, mean, *gyro[4:])
 
     return step
 
@@ -367,7 +385,7 @@ def register(axis: int) -> Register:
         noise_a, noise_b = block_sums(k.sample_deviation[axis], n, draws[0], draws[1])
         y, windows = sinc2_overlapped(gyro.windows, gyro.block.a + noise_a, gyro.block.b + noise_b, n)
         words, null, code, beyond, condition = _word(axis, gyro, y + jitter, offset, p, k, faults, draws[3])
-        return GyroState(gyro.rate, gyro.sensed, EMPTY, windows, mean, gyro.sums, words, null, code, beyond, condition)
+        return GyroState(gyro.sensed, EMPTY, windows, mean, gyro.sums, words, null, code, beyond, condition)
 
     return step
 
@@ -387,11 +405,12 @@ def sample(axis: int, taps: int) -> Sample:
         faults: tuple[FaultParameters, ...],
         draws: tuple[Scalar, ...],
     ) -> tuple[GyroState, DelayLines]:
-        jitter = (gyro.sensed - gyro.mean) * (2.0 / k.sense_period[axis]) * (p.clock_jitter * draws[2])
+        late = p.clock_jitter * draws[2] / ((1.0 - k.low_pass_share[axis]) * k.sense_period[axis])
+        jitter = (gyro.sensed - gyro.mean) * late
         noisy = gyro.mean + jitter + k.sample_deviation[axis] * draws[0] + offset
         y, sums, after = bartlett(gyro.sums, lines, _converted(noisy, p), taps)
         value = y * (p.resolution / CONVERTER_STEPS)
         words, null, code, beyond, condition = _word(axis, gyro, value, 0.0, p, k, faults, draws[3])
-        return GyroState(*gyro[:5], sums, words, null, code, beyond, condition), after
+        return GyroState(*gyro[:4], sums, words, null, code, beyond, condition), after
 
     return step

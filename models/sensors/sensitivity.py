@@ -63,12 +63,19 @@ def hysteresis_offset(loop: Scalar, temperature: Scalar, width: Scalar, amplitud
     return amplitude * ((temperature - loop) / width)
 
 
-def cubic_gains(nonlinearity: Scalar, full_scale: Scalar) -> tuple[Scalar, Scalar]:
-    """c1, c3 of e(x) = c3 x^3 - c1 x whose rms about the best straight line over +-FS is `nonlinearity` FS."""
+def cubic_gains(nonlinearity: Scalar, full_scale: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """c1, c3 of e(x) = c3 x^3 - c1 x whose rms about the best straight line over +-FS is `nonlinearity` FS; c3 FS^2."""
     c = nonlinearity / _CUBIC_RESIDUAL
-    return 0.6 * c, c / (full_scale * full_scale)
+    return 0.6 * c, c / (full_scale * full_scale), c
 
 
-def bent(x: Scalar, gains: tuple[Scalar, Scalar]) -> Scalar:
-    """x + c3 x^3 - c1 x."""
-    return x + x * (gains[1] * (x * x) - gains[0])
+def bent(x: Scalar, gains: tuple[Scalar, Scalar, Scalar]) -> Scalar:
+    """x + c3 x^3 - c1 x within the range; beyond it the gain stays that at its end, 1 + c3 FS^2 - c1."""
+    linear, cubic, most = gains
+    return x + x * (minimum(cubic * (x * x), most) - linear)
+
+
+def straightened(y: Scalar, cubic: Scalar) -> Scalar:
+    """v of v + c v^3 = y by one Newton step from y, short of 3 (c y^2)^3 y; kept from dividing where c y^2 is large."""
+    square = cubic * (y * y)
+    return y - square * y / maximum(1.0 + 3.0 * square, 0.5)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from ..record import Boolean, Real
-from ..scalar import Scalar, absolute, clip, exp, round_half_up, where
+from ..record import Boolean, Integer, Real
+from ..scalar import Scalar, absolute, clip, exp, where
+from .words import nearest_code
 
 
 class ThermalParameters(NamedTuple):
@@ -17,15 +18,20 @@ class ThermalParameters(NamedTuple):
 
 
 class ThermometerParameters(NamedTuple):
-    """A part's thermometer: code = code_at_25 + sensitivity (T + error - 25 degC)."""
+    """A part's thermometer: code = code_at_25 + sensitivity (T + error - 25 degC), as far as its register goes."""
 
     sensitivity: Annotated[float, Real("1/K", "LSB per kelvin", min=-1000.0, max=1000.0)]
     code_at_25: Annotated[float, Real("1", "code at 25 degC", min=-65536.0, max=65536.0)]
+    lowest_code: Annotated[float, Integer("smallest code that the register holds", min=-65536, max=65536)]
+    highest_code: Annotated[float, Integer("largest code that the register holds", min=-65536, max=65536)]
     error: Annotated[float, Real("K", "what the thermometer reads too much", min=-50.0, max=50.0)] = 0.0
 
 
 class HeaterParameters(NamedTuple):
-    """A thermostat around the sensor, as the 2021 paper suggests: a heated enclosure, PI-controlled."""
+    """A thermostat around the sensor, as the 2021 paper suggests: a heated enclosure, PI-controlled.
+
+    All numbers are assumptions: a small insulated box at 45 degC that full power brings to there from 0 degC.
+    """
 
     enabled: Annotated[bool, Boolean("the heater is fitted and on")] = False
     setpoint: Annotated[
@@ -76,7 +82,8 @@ def die_temperature(thermal: ThermalParameters, die: Scalar, ambient: Scalar, pe
 def thermometer_code(thermometer: ThermometerParameters, temperature: Scalar) -> Scalar:
     """The thermometer's register at the die temperature T (K)."""
     warmer = temperature + thermometer.error - 298.15
-    return round_half_up(thermometer.code_at_25 + thermometer.sensitivity * warmer)
+    wanted = thermometer.code_at_25 + thermometer.sensitivity * warmer
+    return nearest_code(wanted, thermometer.lowest_code, thermometer.highest_code)
 
 
 def thermometer_reading(thermometer: ThermometerParameters, code: Scalar) -> Scalar:

@@ -36,3 +36,11 @@ def sensor_dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("sensor")
     build_all(folder, ["AttitudeSensor"])
     return folder
+
+
+@pytest.fixture(scope="session")
+def bench_dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the two FMUs of the bench."""
+    folder = tmp_path_factory.mktemp("bench")
+    build_all(folder, ["Turntable", "AttitudeSensor"])
+    return folder

@@ -11,6 +11,7 @@ from lxml import etree
 from other_master import rows_of
 
 from attitude_fmu.cosim.devices import device_parameters, write_device
+from attitude_fmu.cosim.errors import ResultsError
 from attitude_fmu.cosim.master import simulate
 from attitude_fmu.cosim.ssp import SSC, SSV, read_ssv, write_ssp
 from attitude_fmu.cosim.system import Component, ParameterSet, System, check, start_values
@@ -49,8 +50,16 @@ def test_the_set_names_the_device_and_its_piece() -> None:
 
 
 def test_an_unknown_device_is_refused() -> None:
-    with pytest.raises(AttitudeFmuError, match="there is no device called ADIS16355; there are "):
+    with pytest.raises(
+        AttitudeFmuError,
+        match=r"no device called .ADIS16355.; did you mean ADIS16354_75 or .*devices: ADXRS450_ADXL355, ",
+    ):
         device_parameters("ADIS16355")
+
+
+def test_a_folder_is_no_file_to_write_to(tmp_path: Path) -> None:
+    with pytest.raises(ResultsError, match="it is a folder; name a file"):
+        write_device(tmp_path, "ADIS16354_75")
 
 
 def test_the_file_gives_units_and_defines_them(tmp_path: Path) -> None:
@@ -69,11 +78,13 @@ def test_a_device_changes_the_sensor_as_its_numbers_say(sensor: System, tmp_path
     quiet = {f"sensor.{part}.{term}": 0.0 for part in ("gyro", "accelerometer") for term in ("noise_density",)}
     before = simulate(sensor, step=STEP).results
     after = simulate(mine.with_values("quiet", quiet), step=STEP).results
-    # 1 g at 256000 LSB/g or 0.4672 mg/LSB, with half a per cent of non-linearity and noise; 25 degC and self-heating
-    assert before["sensor.register.acceleration[3]"][-1] == pytest.approx(256_000, rel=0.05)
-    assert after["sensor.register.acceleration[3]"][-1] == pytest.approx(1000.0 / 0.4672, rel=0.01)
-    assert before["sensor.register.gyro_temperature"][-1] == pytest.approx(5.0 * (25.0 + 4.5 - 45.0), abs=0.51)
-    assert after["sensor.register.gyro_temperature"][-1] == pytest.approx(3.3 / 0.1453, abs=0.51)
+    # 1 g at 256000 LSB/g with the board's 16 mg and 1.1 %, within the nonlinearity of 0.1 % of 524288 LSB and four
+    # times the noise of 0.3 mg; at 0.4672 mg/LSB within 0.2 % of 3639 LSB and half a step
+    assert before["sensor.register.acceleration[3]"][-1] == pytest.approx(256_000 * 1.027, abs=525 + 308)
+    assert after["sensor.register.acceleration[3]"][-1] == pytest.approx(1000.0 / 0.4672, abs=7.3 + 0.5)
+    # 25 degC and self-heating, to half a step
+    assert before["sensor.register.gyro_temperature"][-1] == pytest.approx(5.0 * (25.0 + 4.5 - 45.0), abs=0.5)
+    assert after["sensor.register.gyro_temperature"][-1] == pytest.approx(3.3 / 0.1453, abs=0.5)
 
 
 def test_a_later_set_overrides_one_number(sensor: System) -> None:

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import importlib
 import os
 import signal
+import sys
 import threading
 from collections.abc import Mapping
 from functools import partial
@@ -70,6 +72,40 @@ def test_a_changed_trial_is_run_again(decay: System, tmp_path: Path, changed) ->
     first = run_trials([trial], tmp_path)
     second = run_trials([changed(trial)], tmp_path)
     assert first["start/1"]["x"] != second["start/1"]["x"]
+
+
+MODULE = "from beside import FACTOR\n\n\ndef figure(results):\n    return {'x': FACTOR * results['integrator.x'][-1]}\n"
+
+
+@pytest.mark.parametrize(
+    ("changed", "text", "counts"),
+    [
+        ("beside.py", "FACTOR = 20.0\n", True),
+        ("further.py", "FACTOR = 20.0\n", True),
+        ("stranger.py", "FACTOR = 20.0\n", False),
+    ],
+    ids=["imported", "imported by what is imported", "not imported"],
+)
+def test_a_change_in_what_the_function_of_the_figures_imports_counts(
+    decay: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str, text: str, counts: bool
+) -> None:
+    source = tmp_path / "source"
+    source.mkdir()
+    (source / "figures_of_a_test.py").write_text(MODULE)
+    (source / "beside.py").write_text("from further import FACTOR\n")
+    for name in ("further.py", "stranger.py"):
+        (source / name).write_text("FACTOR = 1.0\n")
+    monkeypatch.syspath_prepend(str(source))
+    # another case may have imported one of the same name
+    monkeypatch.delitem(sys.modules, "figures_of_a_test", raising=False)
+    take = importlib.import_module("figures_of_a_test").figure
+    trial = trials(decay, 2)[1]._replace(take=take)
+    first = run_trials([trial], tmp_path / "trials")
+    before = written(tmp_path / "trials")
+    (source / changed).write_text(text)
+    second = run_trials([trial], tmp_path / "trials")
+    assert (written(tmp_path / "trials") != before) is counts
+    assert second["start/1"]["x"] == pytest.approx((20.0 if counts else 1.0) * first["start/1"]["x"])
 
 
 def test_a_changed_fmu_is_run_again(fmus: dict[str, Path], tmp_path: Path) -> None:

@@ -105,9 +105,15 @@ def test_an_order_survives_its_way_to_another_process() -> None:
 
 
 REFUSED: list[tuple[dict[str, Any], str]] = [
-    ({"values": {"gyro.filter": 3}}, r"gyro\.range = 2\.6.*the ADIS16354 takes \+-150 deg/s with 4 taps or more"),
+    (
+        {"values": {"gyro.filter": 3}},
+        r"gyro\.range = 2\.6.*SENS/AVG of an ADIS16354 offers .*\+-150 deg/s with 4 taps",
+    ),
     ({"values": {"gyro.range": -1.0}}, r"gyro\.range = -1 rad/s: too small"),
     ({"values": {"gyro.gain": 1.0}}, r"no parameter 'gyro\.gain'"),
+    ({"values": {"gyro.noise_densty": 1.0}}, r"no parameter 'gyro\.noise_densty'; did you mean gyro\.noise_density"),
+    ({"values": {"gyro.range": "wide"}}, r"gyro\.range = 'wide': not a number \(allowed: 0\.001 rad/s or more\)"),
+    ({"values": {"gyro.filter": "fir"}}, r"gyro\.filter = 'fir': not a choice \(allowed: 1 cic, "),
     ({"device": "ADIS16355"}, r"there is no device called ADIS16355; there are ADXRS450_ADXL355, "),
     ({"specimen": -1}, r"there is no specimen -1"),
     ({"device": None, "specimen": 2}, r"specimen 2 of which device\?"),
@@ -134,6 +140,19 @@ def test_what_is_no_sensor_takes_no_device(tmp_path: Path) -> None:
         build("TripodGimbal", tmp_path, device=DEVICE)
     with pytest.raises(BuildError, match="there is no FMU called TripodGimbal_ADIS16354_150"):
         build("TripodGimbal_ADIS16354_150", tmp_path)
+
+
+def test_own_values_make_another_file_and_take_names_of_choices(tmp_path: Path, load: Callable[..., Instance]) -> None:
+    taps = dict.fromkeys(("gyro.filter", "accelerometer.filter"), "bartlett_16")
+    plain = build("AttitudeSensor", tmp_path, "python", device=DEVICE)
+    paths = [
+        build("AttitudeSensor", tmp_path, "python", device=DEVICE, values=values)
+        for values in (taps, {**taps, "gyro.noise_density": 1e-3}, dict(reversed(taps.items())))
+    ]
+    assert len({plain, *paths}) == 3
+    assert paths[0] == paths[2]
+    instance = load(paths[0])
+    assert (instance["gyro.filter"], instance["accelerometer.filter"]) == (6, 6)
 
 
 def test_own_values_start_any_model(tmp_path: Path, load: Callable[..., Instance]) -> None:

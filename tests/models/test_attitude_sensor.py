@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from attitude_fmu.models.attitude.integration import INTEGRATION, INTEGRATORS, Integrator
 from attitude_fmu.models.attitude.rotations import (
     STANDARD_GRAVITY,
     Euler,
@@ -16,13 +17,14 @@ from attitude_fmu.models.attitude.rotations import (
     matrix_from_euler,
     matrix_from_quaternion,
 )
+from attitude_fmu.models.attitude.velocity_aided import FusionParameters
 from attitude_fmu.models.attitude_sensor import FILTER, MODEL, SOLVER, Inputs, Parameters
 from attitude_fmu.models.errors import ValueRefusedError
 from attitude_fmu.models.filters.kalman import kalman_filtered
 from attitude_fmu.models.record import check, defaults, flatten
 from attitude_fmu.models.sensors.datasheet import REFERENCE_TEMPERATURE
 from attitude_fmu.models.system import Run
-from attitude_fmu.models.vectors import ZERO3, add, multiply_transposed
+from attitude_fmu.models.vectors import ZERO3, add, multiply_transposed, subtract
 
 REAL: Parameters = defaults(Parameters)
 IDEAL = REAL._replace(ideal=True)
@@ -96,6 +98,41 @@ def test_an_ideal_sensor_follows_a_turn_about_every_axis(solver: str) -> None:
     error = Rotation.from_matrix(matrix_from_quaternion(run.outputs().quaternion)).inv() * truth
     # trapezoid on held rates lags by less than half a sample of the last rate change: well below 0.1 deg
     assert math.degrees(error.magnitude()) < (0.1 if solver == "gyro" else 1e-3)
+
+
+def test_every_solver_integrates_in_the_chosen_way() -> None:
+    # a fused solver that trusts its gyros does nothing but integrate; a cone tells the integrators apart
+    fusion = FusionParameters(1e-9, 0.0, 0.0, 1e-9, 1e-9, 1e6, 0.0, rest_bias=0.0)
+    ends = []
+    for item in INTEGRATION.items:
+        shown = []
+        for kind in ("gyro", "fused"):
+            solver = {"kind": SOLVER.value(kind), "integration": INTEGRATION.value(item.name), "fusion": fusion}
+            parameters = with_parts(IDEAL, solver=solver, alignment={"duration": 0.0, "null_gyro": False})
+            run = Run(MODEL, parameters, Inputs())
+            for k in range(1, 501):
+                rate = (2.0 * math.sin(0.3 * k), 2.0 * math.cos(0.3 * k), 0.5)
+                run.advance(Inputs(rate=rate), 0.002 * k)
+            shown.append(np.array(run.outputs().quaternion))
+        # the filter's own corrections: 1e-9 rad of tilt at most
+        assert shown[0] == pytest.approx(shown[1], abs=1e-8)
+        integrate = INTEGRATORS[INTEGRATION.value(item.name)]
+        q = by_hand(integrate, parameters)
+        assert shown[0] == pytest.approx(np.array(q), abs=1e-12)
+        ends.append(shown[0])
+    apart = [np.linalg.norm(a - b) for i, a in enumerate(ends) for b in ends[:i]]
+    assert min(apart) > 1e-12
+
+
+def by_hand(integrate: Integrator, parameters: Parameters) -> Any:
+    """q_nb of the cone of the test above, from its first reading on."""
+    before, q = (2.0 * math.sin(0.3), 2.0 * math.cos(0.3), 0.5), (1.0, 0.0, 0.0, 0.0)
+    for k in range(2, 501):
+        now = (2.0 * math.sin(0.3 * k), 2.0 * math.cos(0.3 * k), 0.5)
+        earth = multiply_transposed(matrix_from_quaternion(q), earth_rate_n(parameters.latitude))
+        q = integrate(q, subtract(before, earth), subtract(now, earth), 0.002)
+        before = now
+    return q
 
 
 @pytest.mark.parametrize("step", [0.005, 0.0073, 0.01])

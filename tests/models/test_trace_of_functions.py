@@ -119,18 +119,6 @@ CASES: dict[str, tuple[Callable[..., Any], Sampler]] = {
         lambda chance: (chance.uniform(0.0, 0.99), *channel_arguments(chance)[2:4]),
     ),
     "with_watched_sample": (alignment.with_watched_sample, watched_arguments),
-    "standard_error": (
-        alignment.standard_error,
-        lambda chance: (tuple(x * x for x in vector(chance, 1.0)), chance.choice((0.0, 1.0, 2.0, 1000.0))),
-    ),
-    "tilt_error": (
-        alignment.tilt_error,
-        lambda chance: (chance.choice((vector(chance, 10.0), (0.0, -9.8, 0.0))), vector(chance, 0.01)),
-    ),
-    "heading_from_magnetic": (
-        alignment.heading_from_magnetic,
-        lambda chance: (vector(chance, 50.0), chance.uniform(-1.6, 1.6), chance.uniform(-3.2, 3.2)),
-    ),
 }
 
 
@@ -146,5 +134,7 @@ def test_a_function_traces_to_the_same_bits(function: Callable[..., Any], sample
 def test_the_watched_samples_both_restart_and_go_on() -> None:
     chance = random.Random(1)
     samples = [watched_arguments(chance) for _ in range(POINTS)]
-    restarted = [alignment.with_watched_sample(*arguments).restarts > arguments[0].restarts for arguments in samples]
+    restarted = [
+        alignment.with_watched_sample(*arguments).sums.samples <= arguments[0].sums.samples for arguments in samples
+    ]
     assert 10 < sum(restarted) < POINTS - 10

@@ -550,6 +550,11 @@ def test_gusts_go_on_when_the_solver_is_refined() -> None:
         (DEFAULT._replace(stop=DEFAULT.stop._replace(roll=EndStop(stiffness=1e4))), "solver_period"),
         (DEFAULT._replace(solver_period=9e-3), "solver_period"),
         (DEFAULT._replace(ambient_temperature=20.0), "ambient_temperature"),
+        (DEFAULT._replace(initial=Initial(joint_rate=Axes(0.0, 0.0, -10.1))), "initial.joint_rate.roll"),
+        (DEFAULT._replace(wind=DEFAULT.wind._replace(speed=60.0)), "wind.period"),
+        (DEFAULT._replace(wind=DEFAULT.wind._replace(lens_diameter=0.03)), "wind.period"),
+        # 1.5 ms would do, but is rounded to 2 ms
+        (DEFAULT._replace(wind=DEFAULT.wind._replace(speed=60.0, period=1.5e-3)), "wind.period"),
         (DEFAULT._replace(tripod=DEFAULT.tripod._replace(stiffness=Axes(320.0, 1.0, 500.0))), "tripod.stiffness.pitch"),
         (
             DEFAULT._replace(
@@ -566,3 +571,35 @@ def test_gusts_go_on_when_the_solver_is_refined() -> None:
 def test_impossible_parameters_are_refused_by_name(changed: Parameters, name: str) -> None:
     with pytest.raises(ValueRefusedError, match=rf"rig\.{name}"):
         Run(plant.MODEL, changed, Inputs(), name="rig")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"speed": 10.0},
+        {"speed": 60.0, "period": 1e-3},
+        {"speed": 60.0, "shedding": 0.0},
+        {"speed": 0.0, "period": 1.0},
+    ],
+)
+def test_a_wind_that_the_clock_follows_is_taken(changes: dict[str, float]) -> None:
+    Run(plant.MODEL, DEFAULT._replace(wind=DEFAULT.wind._replace(**changes)), Inputs())
+
+
+def test_a_refused_period_of_the_wind_tells_what_to_do() -> None:
+    strong = DEFAULT._replace(wind=DEFAULT.wind._replace(speed=60.0))
+    with pytest.raises(ValueRefusedError, match=r"rig\.wind\.period = 0\.005 s: too long .* set wind\.shedding to 0 "):
+        Run(plant.MODEL, strong, Inputs(), name="rig")
+
+
+def test_the_hardest_impact_allowed_at_the_start_is_stable_at_the_longest_step() -> None:
+    """The same number limits the rate at the start and counts for the step: a joint thrown at its stop loses energy."""
+    stop = EndStop(-0.1, 0.1)
+    p = BALANCED._replace(
+        stop=JointStops(stop, stop, stop), initial=Initial(joint_rate=Axes(10.0, 0.0, 0.0)), solver_period=1e-3
+    )
+    c = plant.coefficients(p)
+    energies = np.array([plant.energy(state, p, c) for state in simulated(p, 300)])
+    assert np.isfinite(energies).all()
+    assert energies[-1] < energies[0]
+    assert energies.max() < 1.001 * energies[0]

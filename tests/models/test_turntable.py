@@ -203,7 +203,8 @@ def test_turning_at_a_rate_is_felt_as_that_rate() -> None:
 
 def test_bits_do_not_depend_on_how_the_master_cuts_time() -> None:
     p = MOVING._replace(
-        shaking=turntable.Shaking((0.1, 0.2, 0.3)), shock=turntable.Shock((1.0, 2.0, 3.0), 0.1234, 0.01, 2, 0.05)
+        shaking=turntable.Shaking((0.1, 0.2, 0.3), lower_frequency=1.0),
+        shock=turntable.Shock((1.0, 2.0, 3.0), 0.1234, 0.01, 2, 0.05, 0.5),
     )
     ends = []
     for step in (1e-3, 5e-3, 7.3e-3, 10e-3):
@@ -360,6 +361,20 @@ def test_shocks_hand_over_their_speed() -> None:
     np.testing.assert_allclose(felt.sum(axis=0) * 1e-3, expected, rtol=1e-9)
 
 
+def test_a_bench_held_in_its_place_is_given_back_its_speed() -> None:
+    """Velocity by the specific force, from many starts: free, it is a random walk; held at 2 Hz, it is not."""
+    rms, lasting, starts = 0.2, 2000, 20
+    speeds = {}
+    for lower in (0.0, 2.0):
+        p = PERFECT._replace(shaking=turntable.Shaking((rms, 0.0, 0.0), 50.0, 0.7, lower))
+        speeds[lower] = [1e-3 * np.sum(vibrated(p, lasting, seed)[:, 0]) for seed in range(starts)]
+    # by a density of 2 zeta rms^2/(pi f), two-sided: density T, and density/(2 sqrt(2) w); chi-square of 20 starts
+    density = 2.0 * 0.7 * rms**2 / (PI * 50.0)
+    low, high = chi_square_bounds(starts)
+    assert low < np.mean(np.square(speeds[0.0])) / (density * 2.0) < high
+    assert low < np.mean(np.square(speeds[2.0])) / (density / (2.0 * math.sqrt(2.0) * 4.0 * PI)) < high
+
+
 def test_without_vibration_nothing_is_drawn() -> None:
     run = Run(turntable.MODEL, DEFAULT, INPUTS)
     run.advance(INPUTS, 0.02)
@@ -374,6 +389,7 @@ def test_without_vibration_nothing_is_drawn() -> None:
     ("changed", "name"),
     [
         (DEFAULT._replace(shock=turntable.Shock(duration=0.1, pulses=2, period=0.05)), "shock.period"),
+        (DEFAULT._replace(shock=turntable.Shock(duration=0.1, pulses=2, period=0.15, rebound=0.5)), "shock.period"),
         (DEFAULT._replace(chamber=turntable.Chamber(initial_temperature=20.0)), "chamber.initial_temperature"),
         (DEFAULT._replace(profile=Profile(row=(move(rest=-1.0), *[Row()] * (ROWS - 1)))), r"profile.row\[1\].duration"),
     ],

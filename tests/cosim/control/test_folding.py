@@ -42,7 +42,8 @@ def test_the_guard_sees_a_state_too_few() -> None:
 
 
 def rate_path(taps: int) -> control.StateSpace:
-    parameters = {"processor.period": WORD, "gyro.filter": f"bartlett_{taps}", "gyro.range": np.radians(300.0)}
+    filters = {f"{part}.filter": f"bartlett_{taps}" for part in ("gyro", "accelerometer")}
+    parameters = {"processor.period": WORD, "gyro.range": np.radians(300.0), **filters}
     point = operating_point(ADIS, WORD, parameters, settle=0.5)
     return model_ss(ADIS, WORD, operating_point=point, inputs="rate[1]", outputs="rate_measured[1]")
 

@@ -191,7 +191,8 @@ def test_they_are_linear_in_the_direction(unit: Instance, model: Model) -> None:
     parts = [_derivatives(unit, unknowns, {known: size}) for known, size in direction.items()]
     for unknown in unknowns:
         size = sum(abs(part[unknown]) for part in parts)
-        assert whole[unknown] == pytest.approx(sum(part[unknown] for part in parts), abs=1e-9 * size + 1e-15)
+        # a last pivot of Davenport's noise is a small difference of large numbers: seven digits of sixteen are left
+        assert whole[unknown] == pytest.approx(sum(part[unknown] for part in parts), abs=1e-6 * size + 1e-15)
 
 
 def _ends(variable: Any) -> list[float]:

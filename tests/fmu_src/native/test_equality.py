@@ -12,7 +12,7 @@ import every_kind
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmu_instance import EVERY_KIND, Instance
-from random_records import settable_near
+from random_records import reconciled, settable_near
 from refused_calls import REFUSED
 
 from attitude_fmu.fmu_src.build import build
@@ -39,7 +39,13 @@ STEPS: tuple[tuple[int, Callable[[random.Random], float]], ...] = (
 
 SOONER: dict[str, Values] = {
     "AttitudeSensor": {"alignment.duration": 0.03, "solver.fusion.rest_time": 0.05, "filter.divider": 3},
-    "TripodGimbal": {"shutter.start": 0.02, "shutter.period": 0.15, "knock.start": 0.05},
+    "TripodGimbal": {
+        "shutter.start": 0.02,
+        "shutter.period": 0.15,
+        "press.force": 2.0,
+        "press.start": 0.02,
+        "knock.start": 0.05,
+    },
     "Turntable": {
         **{f"profile.row[{row}].duration": 0.02 for row in (1, 2, 3)},
         **{
@@ -95,8 +101,9 @@ def _parameters(model: Model, case: int, chance: random.Random) -> Values:
             choice = _choice(leaf, case, place)
             centre = centres.get(leaf.name, leaf.start)
             found[leaf.name] = settable_near(leaf, centre, chance) if choice is None else choice
-        if _runs(model, found):
-            return found
+        together = reconciled(model, list(found.values()))
+        if together is not None and _runs(model, dict(zip(found, together, strict=True))):
+            return dict(zip(found, together, strict=True))
 
 
 def _tuned(model: Model, parameters: Values, chance: random.Random) -> Values:

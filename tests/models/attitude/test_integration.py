@@ -21,6 +21,7 @@ from attitude_fmu.models.attitude.integration import (
     coning_compensated,
     coning_rotation,
     coning_with_previous,
+    mean_rate,
     mean_rotation,
     quaternion_rate,
     rotation_vector,
@@ -130,12 +131,23 @@ def test_runge_kutta_and_taylor_have_fourth_order_where_the_rate_is_linear(
     assert order(step, rate, 40) == pytest.approx(4.0, abs=0.1)
 
 
+@pytest.mark.parametrize("rate", [constant, linear])
+def test_the_mean_rate_of_each_interval_turns_by_its_increment(rate: Callable[[float], Vector]) -> None:
+    q: Any = START
+    means = [rate(0.1 * (k + 0.5)) for k in range(5)]  # of a rate that is linear in time
+    expected: Any = START
+    for mean in means:
+        q = mean_rate(q, rate(0.0), mean, 0.1)
+        expected = turned(expected, (0.1 * mean[0], 0.1 * mean[1], 0.1 * mean[2]))
+    assert q == expected
+
+
 @pytest.mark.parametrize("step", [rotation_vector, coning_compensated])
 def test_closed_forms_have_second_order_where_the_axis_moves(step: Callable[..., Any]) -> None:
     assert order(step, linear, 40) == pytest.approx(2.0, abs=0.1)
 
 
-@EVERY_INTEGRATOR
+@pytest.mark.parametrize("step", [runge_kutta_4, taylor_4, rotation_vector, coning_compensated])
 def test_a_rate_that_bends_between_samples_leaves_second_order_to_all(step: Callable[..., Any]) -> None:
     def bending(t: float) -> Vector:
         return math.sin(3.0 * t), math.cos(4.0 * t), 0.5 + math.sin(2.0 * t)

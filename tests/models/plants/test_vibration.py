@@ -11,7 +11,16 @@ from scipy.linalg import solve_discrete_lyapunov
 from scipy.signal import welch
 from scipy.stats import chi2
 
-from attitude_fmu.models.plants.vibration import Oscillation, Oscillator, oscillated, oscillator
+from attitude_fmu.models.plants.vibration import (
+    Held,
+    Oscillation,
+    Oscillator,
+    Shaking,
+    held,
+    holder,
+    oscillated,
+    oscillator,
+)
 
 PERIOD = 1e-3
 
@@ -112,3 +121,44 @@ def test_rate_and_acceleration_are_derivatives() -> None:
     first = w * w * (push - start.value) - 2.0 * 0.1 * w * start.rate
     simpson = PERIOD / 6.0 * (first + 4.0 * middle.acceleration + end.acceleration)
     assert end.rate - start.rate == pytest.approx(simpson, rel=1e-7)
+
+
+# --- a bench that is held in its place -------------------------------------------------------------------------------
+
+
+def felt(lower_frequency: float, pushes: NDArray[np.float64], period: float = PERIOD) -> NDArray[np.float64]:
+    """What a bench feels that is pushed so, tick by tick."""
+    c, now, found = holder(Shaking(lower_frequency=lower_frequency), period), Held(), []
+    for push in pushes.tolist():
+        now = held(c, now, push)
+        found.append(now.acceleration)
+    return np.array(found)
+
+
+def test_a_bench_that_is_not_held_feels_the_push_itself() -> None:
+    pushes = np.random.default_rng(1).standard_normal(100)
+    np.testing.assert_array_equal(felt(0.0, pushes), pushes)
+
+
+@pytest.mark.parametrize("frequency", [0.5, 2.0, 20.0])
+def test_below_its_lower_frequency_a_held_bench_stays_where_it_is(frequency: float) -> None:
+    """Against |G| = r^2/sqrt((1 - r^2)^2 + 2 r^2), r = f/f_lower; 10 s are 63 time constants, whole cycles follow."""
+    lower, count = 2.0, 10_000
+    time = PERIOD * np.arange(3 * count)
+    tail = felt(lower, np.sin(2.0 * math.pi * frequency * time))[-count:]
+    gain = 2.0 * abs(np.mean(tail * np.exp(-2j * math.pi * frequency * time[-count:])))
+    r = frequency / lower
+    expected = r * r / math.sqrt((1.0 - r * r) ** 2 + 2.0 * r * r)
+    # the mean over a period of 20 Hz is (pi f T)^2/6 less, twice with the hold's: 1.3e-3
+    assert gain == pytest.approx(expected, rel=2e-3)
+
+
+def test_speed_and_way_of_a_held_bench_are_bounded() -> None:
+    """A steady push moves it by 1/w^2 and leaves no speed: sums of the mean acceleration, to rounding."""
+    lower = 2.0
+    w = 2.0 * math.pi * lower
+    speed = np.cumsum(felt(lower, np.ones(5000))) * PERIOD
+    assert abs(speed[-1]) < 1e-12
+    # the way by the trapezoid rule, whose error is (w T)^2/12
+    way = PERIOD * (np.sum(speed) - 0.5 * speed[-1])
+    assert way * w * w == pytest.approx(1.0, rel=1e-4)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from faultless_parts import ADIS, STILL, faultless, run_of
+from faultless_parts import ADIS, GYRO, STILL, faultless, run_of
 
 from attitude_fmu.models.attitude_sensor import MODEL
 from attitude_fmu.models.sensors import adis16354_words, gyro
@@ -40,6 +40,35 @@ def test_the_automatic_null_takes_one_reading_off_in_steps_of_the_offset_registe
     assert offset == math.floor(-first * 4.0 + 0.5)  # 0.07326 deg/s is four of its steps
     assert offset == adis16354_words.signed(adis16354_words.gyro_offset_word(-shown[0]), 13)
     assert abs(shown[1]) <= 0.5 * faultless(ADIS).gyro.resolution + LSB
+
+
+@pytest.mark.parametrize(
+    ("device", "way", "first"), [(ADIS, "bartlett_4", 7), (ADIS, "bartlett_64", 127), (GYRO, "cic", 4)]
+)
+def test_the_automatic_null_errs_by_the_noise_of_one_reading(device: str, way: str, first: int) -> None:
+    # 300 pieces of noise: the deviation has a standard error of 1/sqrt(600) = 4.1 %, four of these are allowed
+    p = faultless(device, gyro__autonull=AUTONULL.value("automatic"), gyro__filter=GYRO_FILTER.value(way)).gyro
+    p = p._replace(noise_density=math.radians(0.5))
+    k = gyro.gyro_coefficients(p, IDENTITY3, False)
+    taps = 4 if way == "cic" else (first + 1) // 2
+    register, sample, chance = gyro.register(0), gyro.sample(0, taps), np.random.default_rng(2)
+    offsets = []
+    for _ in range(300):
+        state, lines = gyro.initial_gyro(0, ZERO3, ZERO3, 0.0, 1.0, p, k)
+        code = 0.0
+        for word in range(1, first + 1):
+            assert state.null == (0.0, 0.0, 0.0), word
+            draws = tuple(chance.normal(size=4).tolist())
+            if way == "cic":
+                state = register(state, 0.0, p, k, (), draws)
+            else:
+                state, lines = sample(state, lines, 0.0, p, k, (), draws)
+            code = state.code
+        assert (state.null.sum, state.null.done) == (code, 1.0)
+        offsets.append(state.null.offset * p.null_resolution)
+    window = np.convolve(np.ones(64), np.ones(64)) / 64**2 if way == "cic" else np.bartlett(2 * taps + 1)[1:-1] / taps
+    noise = k.sample_deviation[0] * math.sqrt(window @ window)
+    assert np.std(offsets) == pytest.approx(noise, rel=4 * 0.041)
 
 
 def test_a_null_finer_than_the_code_shows_in_the_mean() -> None:
@@ -92,10 +121,11 @@ def test_the_whole_sensor_nulls_each_gyro_of_its_own() -> None:
 
 def test_a_null_of_thirty_seconds_is_under_way_before() -> None:
     way = GYRO_FILTER.value("bartlett_64")
-    p = faultless(ADIS, gyro__bias=(0.01, 0.0, 0.0), gyro__filter=way, gyro__autonull=AUTONULL.value("precision"))
+    null = AUTONULL.value("precision")
+    p = faultless(ADIS, gyro__bias=(0.01, 0.0, 0.0), gyro__filter=way, accelerometer__filter=way, gyro__autonull=null)
     run = Run(MODEL, p, STILL)
     assert run.coefficients.gyro.null_words == (24_576.0,) * 3
     run.advance(STILL, 0.2)
-    null = run.state.gyro[0].null
-    assert (null.done, null.offset) == (0.0, 0.0)
-    assert null.sum == pytest.approx(8 * run.state.gyro[0].words)  # 0.573 deg/s is 7.8 LSB
+    state = run.state.gyro[0]
+    assert (state.null.done, state.null.offset) == (0.0, 0.0)
+    assert state.null.sum == 8 * (state.words - 126)  # 0.573 deg/s is 7.8 LSB; words 1 to 126 reach behind the start

@@ -86,7 +86,7 @@ def test_datasheet_units_become_si(part: Part, name: str, expected: float) -> No
 
 
 def test_a_largest_deviation_becomes_the_rms_of_the_models_cubic() -> None:
-    linear, cubic = cubic_gains(in_si(1.0, "% FS largest"), 2.0)
+    linear, cubic, _ = cubic_gains(in_si(1.0, "% FS largest"), 2.0)
     bend = [abs(cubic * x**3 - linear * x) for x in np.linspace(-2.0, 2.0, 2001)]
     assert max(bend) == pytest.approx(0.01 * 2.0, rel=1e-3)
 
@@ -148,7 +148,7 @@ def test_a_device_runs(name: str) -> None:
 @pytest.mark.parametrize(("name", "taps"), [("ADIS16354_150", "bartlett_2"), ("ADIS16354_75", "bartlett_8")])
 def test_too_few_taps_for_the_range_are_refused_with_the_rule(name: str, taps: str) -> None:
     kinds = LEAVES["gyro.filter"].fact
-    with pytest.raises(ValueRefusedError, match=r"gyro\.range.*\+-150 deg/s with 4 taps or more.*\+-75 deg/s with 16"):
+    with pytest.raises(ValueRefusedError, match=r"gyro\.range.*\+-150 deg/s with 4 taps or more, \+-75 deg/s with 16"):
         check_rules(MODEL, record_of(name, gyro__filter=kinds.value(taps)), "sensor")  # type: ignore[union-attr]
 
 
@@ -238,12 +238,38 @@ def test_many_pieces_follow_the_tolerances(name: str) -> None:
             assert not values.any()
             continue
         tolerance = origins[parameter]
+        if isinstance(tolerance, Datum):
+            assert tolerance.limits is not None
+            low, high = (in_si(limit, tolerance.unit) for limit in tolerance.limits)
+            assert low <= values.min() < values.max() <= high, parameter
+            # as many below the typical number as above: binomial, 4.5 standard deviations
+            assert abs(np.sum(values < tolerance.si) - 0.5 * PIECES) < 4.5 * math.sqrt(0.25 * PIECES), parameter
+            # the widest scatter by 44 % of their mean, which 400 pieces know to 2.2 %: 4.5 times that
+            assert np.mean(values) == pytest.approx(0.25 * (low + 2.0 * tolerance.si + high), rel=0.1), parameter
+            continue
         assert isinstance(tolerance, Tolerance)
         mean, sigma, largest = expected_moments(tolerance)
         # 4.5 standard errors: one in 150 000, for some hundred parameters
         assert abs(values.mean() - mean) < 4.5 * sigma / math.sqrt(PIECES), parameter
         assert values.std() == pytest.approx(sigma, rel=4.5 / math.sqrt(2.0 * PIECES)), parameter
         assert np.abs(values - mean).max() <= largest, parameter
+
+
+def test_numbers_printed_with_limits_differ_from_piece_to_piece() -> None:
+    for name, drawn in (
+        (
+            "ADXRS450_ADXL355",
+            {"accelerometer.overload", *(f"accelerometer.self_test_response[{i}]" for i in (1, 2, 3))},
+        ),
+        ("ADIS16354_300", {f"gyro.self_test_response[{i}]" for i in (1, 2, 3)}),
+    ):
+        nominal = devices.parameters(name)
+        for parameter in drawn:
+            assert nominal[parameter] == devices.origins(name)[parameter].si  # type: ignore[union-attr]
+            assert len({devices.parameters(name, number)[parameter] for number in range(5)}) == 5
+    lsb = math.degrees(devices.parameters("ADIS16354_300")["gyro.resolution"])
+    limits = adis16354_sheet.GYROS_300.datum("self_test_response").limits
+    assert limits == pytest.approx((432 * lsb, 1105 * lsb), abs=0.005)
 
 
 def test_axes_of_a_piece_are_independent() -> None:

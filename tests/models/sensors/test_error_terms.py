@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from faultless_parts import ADIS, GYRO, STILL, faultless, only_slow, run_of
 
+from attitude_fmu.models.attitude.rotations import STANDARD_GRAVITY, earth_rate_n
 from attitude_fmu.models.attitude_sensor import MODEL, Parameters
-from attitude_fmu.models.sensors import accelerometer, gyro, sensitivity
+from attitude_fmu.models.record import defaults, with_defaults
+from attitude_fmu.models.sensors import accelerometer, devices, gyro, sensitivity
 from attitude_fmu.models.sensors.accelerometer import OUTPUT_DATA_RATE
 from attitude_fmu.models.sensors.gyro import GYRO_FILTER
 from attitude_fmu.models.system import Run
@@ -67,10 +69,10 @@ def words_of_noise(part: str, count: int, **values: Any) -> np.ndarray:
         for draws in normal_draws(2, count, 10):
             if taps:
                 part_state, three = step(part_state, three, ZERO3, a, c, (), draws)
-                found.append(part_state.code[1] * a.resolution)
+                found.append(part_state.latest.code[1] * a.resolution)
             else:
                 part_state = accelerometer.register(part_state, ZERO3, a, c, (), draws)
-                found.append(part_state.pending[1] * a.resolution)
+                found.append(part_state.latest.code[1] * a.resolution)
     return np.array(found)
 
 
@@ -170,6 +172,26 @@ def test_the_bias_instability_starts_and_stays_at_its_level(part: str) -> None:
             )
         ]
         assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(level, rel=4 * 0.041)
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_turn_on_bias_and_instability_are_drawn_at_a_tenth_of_a_second(part: str) -> None:
+    run = Run(MODEL, only_slow(**{f"{part}__turn_on_bias": 0.3, f"{part}__bias_instability": 1e-3}), STILL)
+    run.advance(STILL, 0.099)
+    assert getattr(run.state.slow, f"{part}_offset") == ZERO3
+    run.advance(STILL, 0.1)
+    assert min(map(abs, getattr(run.state.slow, f"{part}_offset"))) > 0.0
+
+
+def test_the_alignment_misses_the_twentieth_of_the_turn_on_bias_that_came_before_it() -> None:
+    p = faultless(fine=True, gyro__turn_on_bias=1e-3)
+    level = STILL._replace(rate=earth_rate_n(p.latitude), specific_force=(0.0, 0.0, STANDARD_GRAVITY))
+    run = run_of(p, level, 2.0)
+    assert run.state.attitude.aligned == 1.0
+    turn_on = run.state.slow.gyro_wander.turn_on
+    # drawn ahead of the 50th of 1000 readings, and in its word
+    for axis in range(3):
+        assert run.state.attitude.bias[axis] / turn_on[axis] == pytest.approx(1.0 - 0.049, abs=1e-4)
 
 
 # --- temperature -----------------------------------------------------------------------------------------------------
@@ -333,7 +355,7 @@ def test_registers_end_at_the_range(device: str) -> None:
         assert codes == (min(end, one.code_limit - 1), -min(end, one.code_limit), 0.0)
     assert all(gyro.over_range for gyro in shown.state.gyro[:2])
     assert not shown.state.gyro[2].over_range
-    assert shown.state.accelerometer.over_range
+    assert accelerometer.registers(shown.state.accelerometer, shown.coefficients.accelerometer).over_range
 
 
 @BOTH
@@ -353,7 +375,14 @@ def test_codes_are_the_nearest_of_the_truth(device: str) -> None:
 
 
 def test_an_overload_silences_the_accelerometer_for_half_a_millisecond() -> None:
-    part = faultless(fine=True, accelerometer__output_data_rate=OUTPUT_DATA_RATE.value("4000_Hz")).accelerometer
+    bent = defaults(Parameters).accelerometer.nonlinearity
+    assert bent > 0.0
+    part = faultless(
+        fine=True,
+        accelerometer__output_data_rate=OUTPUT_DATA_RATE.value("4000_Hz"),
+        accelerometer__range=2.048 * STANDARD_GRAVITY,
+        accelerometer__nonlinearity=bent,
+    ).accelerometer
     k = accelerometer.accelerometer_coefficients(part, IDENTITY3, False)
     state, _ = accelerometer.initial_accelerometer((0.0, 0.0, 9.0), ZERO3, (1.0, 1.0, 1.0), part, k)
     assert part.overload == pytest.approx(8 * 9.80665)
@@ -363,6 +392,37 @@ def test_an_overload_silences_the_accelerometer_for_half_a_millisecond() -> None
         state = accelerometer.sense(state, felt, (1.0, 1.0, 1.0), part, k)
         heard.append(state.specific_force[2] != 0.0)
     assert heard == [tick not in (3, 4) for tick in range(12)]  # 4 kHz: two samples are 0.5 ms
+
+
+@pytest.mark.parametrize("device", ["ADXRS450_ADXL355", "ADXRS450_ADXL355_4g", "ADXRS450_ADXL355_8g"])
+@pytest.mark.parametrize("axis", range(3))
+def test_the_overload_is_one_of_specific_force_and_not_of_the_bent_reading(device: str, axis: int) -> None:
+    part = defaults(with_defaults(Parameters, devices.parameters(device))).accelerometer
+    k = accelerometer.accelerometer_coefficients(part, IDENTITY3, False)
+    state, _ = accelerometer.initial_accelerometer(ZERO3, ZERO3, (1.0, 1.0, 1.0), part, k)
+    for share, silent in ((0.999, False), (1.001, True), (-0.999, False), (-1.001, True)):
+        felt = tuple(share * part.overload if i == axis else 0.0 for i in range(3))
+        assert (accelerometer.sense(state, felt, (1.0, 1.0, 1.0), part, k).silent > 0) is silent
+
+
+def test_beyond_the_range_a_reading_grows_as_at_its_end() -> None:
+    gains = sensitivity.cubic_gains(0.01, 2.0)
+    end = sensitivity.bent(2.0, gains)
+    for x in (2.0, 3.0, 8.0, 1e3):
+        assert sensitivity.bent(x, gains) == pytest.approx(end / 2.0 * x)
+        assert sensitivity.bent(-x, gains) == -sensitivity.bent(x, gains)
+
+
+@BOTH
+def test_the_lever_arm_is_the_accelerometers_and_gyros_feel_the_force_as_given(device: str) -> None:
+    # turning at 3 rad/s 0.5 m off the place where the force is given: 4.5 m/s^2 inwards, for the accelerometer alone
+    push = ((1e-3, 2e-3, -1e-3), (0.0, 3e-3, 1e-3), (-2e-3, 0.0, 1e-3))
+    p = faultless(device, True, gyro__g_sensitivity=push, mounting__lever_arm=(0.5, 0.0, 0.0))
+    turning = STILL._replace(rate=(0.0, 0.0, 3.0), specific_force=(1.0, 2.0, 9.0))
+    for until in (0.0, 0.05):  # at the start and later
+        shown = read(p, turning, until)
+        assert shown["gyro"] == pytest.approx([0.0, 0.0, 3.0] + np.array(push) @ (1.0, 2.0, 9.0), abs=1e-8)
+        assert shown["accelerometer"] == pytest.approx((1.0 - 4.5, 2.0, 9.0), abs=2e-8)
 
 
 def test_a_turned_accelerometer_is_overloaded_along_its_own_axes() -> None:
@@ -393,27 +453,42 @@ def test_a_clocks_error_makes_more_or_fewer_words(device: str) -> None:
     assert abs(run.state.accelerometer.words - 0.5 * nominal[1] * 1.03) <= 1.0
 
 
+@pytest.mark.parametrize("error", [-0.05, 0.0, 0.03])
+def test_the_processors_clock_error_makes_more_or_fewer_readings(error: float) -> None:
+    p = faultless(processor__clock_error=error)
+    run = run_of(p, STILL, 2.0)
+    assert abs(run.state.reading.readings - 2.0 * 500.0 * (1.0 + error)) <= 1.0
+    ideal = run_of(p._replace(ideal=True), STILL, 2.0)
+    assert ideal.state.reading.readings == 1000.0
+    # a faster processor reads words twice, a slower one misses some
+    beat = 6.0 * 2.0 * 500.0 * error
+    assert abs(run.state.reading.repeated - max(beat, 0.0)) <= 6
+    assert abs(run.state.reading.missed - max(-beat, 0.0)) <= 6
+
+
 def test_repeated_and_missed_words_are_the_beat_of_the_clocks() -> None:
     # a part faster than the processor loses f_part - f_processor words a second, a slower one repeats as many
     p = faultless(gyro__clock_error=(0.02, -0.03, 0.05), accelerometer__clock_error=0.04)
     run = run_of(p, STILL, 3.0)
     reading = run.state.reading
     assert run.outputs().sample == (reading.repeated, reading.missed)
-    assert abs(reading.missed - 3.0 * 500.0 * (0.02 + 0.05 + 0.04)) <= 3
+    # the accelerometer's three axes count one by one
+    assert abs(reading.missed - 3.0 * 500.0 * (0.02 + 0.05 + 3.0 * 0.04)) <= 5
     assert abs(reading.repeated - 3.0 * 500.0 * 0.03) <= 2
 
 
 def test_a_slow_processor_misses_most_words_and_an_ideal_sensor_repeats_none() -> None:
     slow = run_of(faultless(processor__period=0.01), STILL, 2.0).outputs().sample
     assert slow.repeated == 0
-    assert abs(slow.missed - 2.0 * (500.0 - 100.0) * 4) <= 16
+    assert abs(slow.missed - 2.0 * (500.0 - 100.0) * 6) <= 24
     assert run_of(faultless(ideal=True), STILL, 0.1).outputs().sample == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("part", PARTS)
 @BOTH
 def test_jitter_errs_by_the_slope_of_the_signal(device: str, part: str) -> None:
-    # on a ramp of 2 /s a sample 1e-4 s early or late errs by 2e-4; 2000 words: 1.6 % standard error
+    # on a ramp of 0.1 /s^2 a sample 1e-3 s early or late errs by 1e-4; a standard deviation of 1990 words is known to
+    # 1/sqrt(2 * 1990) = 1.6 %, four of these
     slope, jitter = 0.1, 1e-3
     way = {"gyro__filter": GYRO_FILTER.value("bartlett_1"), "accelerometer__filter": 2} if device == ADIS else {}
     p = faultless(device, True, **way, **{f"{part}__clock_jitter": jitter})
@@ -447,7 +522,7 @@ def test_jitter_errs_by_the_slope_of_the_signal(device: str, part: str) -> None:
                 part_state = accelerometer.register(part_state, ZERO3, p.accelerometer, a, (), z)
             else:
                 part_state, three = accelerometer.sample(1)(part_state, three, ZERO3, p.accelerometer, a, (), z)
-            shown.append((part_state.pending if device == GYRO else part_state.code)[0] * p.accelerometer.resolution)
+            shown.append(part_state.latest.code[0] * p.accelerometer.resolution)
             plain.append(level)
         drawn = np.array([z[6] for z in draws])
     error = (np.array(shown) - np.array(plain))[10:]

@@ -10,6 +10,7 @@ from faultless_parts import ADIS, GYRO, STILL, faultless, run_of
 
 from attitude_fmu.models.attitude_sensor import MODEL, Parameters
 from attitude_fmu.models.sensors import adis16354_words, adxl355_registers, adxrs450_frame
+from attitude_fmu.models.sensors.accelerometer import HIGH_PASS, registers
 from attitude_fmu.models.sensors.faults import CHANNEL, FAULT, FaultParameters, faulted
 from attitude_fmu.models.system import Run
 
@@ -36,6 +37,13 @@ def codes(run: Run) -> tuple[float, ...]:
 
 def readings(run: Run) -> tuple[float, ...]:
     return *run.state.reading.rate, *run.state.reading.specific_force
+
+
+def part_of(run: Run, channel: int) -> Any:
+    """What the part of a channel shows: over-range and condition."""
+    if channel < 3:
+        return run.state.gyro[channel]
+    return registers(run.state.accelerometer, run.coefficients.accelerometer)
 
 
 def full_scale(run: Run, channel: int) -> float:
@@ -79,8 +87,7 @@ def test_a_saturated_channel_lies_at_the_end_of_its_range_and_says_so(device: st
         during = at(run, MOVING, END - 0.005)
         assert during[channel] == pytest.approx(sign * full_scale(run, channel), abs=1.0)
         assert [*during[:channel], *during[channel + 1 :]] == [*well[:channel], *well[channel + 1 :]]
-        beyond = run.state.gyro[channel].over_range if channel < 3 else run.state.accelerometer.over_range
-        assert beyond == 1.0
+        assert part_of(run, channel).over_range == 1.0
         assert at(run, MOVING, STOP) == well
 
 
@@ -144,8 +151,9 @@ def test_lost_frames_hold_the_last_reading_while_the_part_goes_on(device: str, c
     assert readings(run) == readings(run_of(faultless(device), OTHER, STOP))
 
 
-def test_lost_words_of_a_gyro_are_missed_ones() -> None:
-    run = Run(MODEL, with_fault(GYRO, "lost_frames", 1, start=0.1, end=0.2), STILL)
+@CHANNELS
+def test_lost_words_are_missed_ones(channel: int) -> None:
+    run = Run(MODEL, with_fault(GYRO, "lost_frames", channel, start=0.1, end=0.2), STILL)
     run.advance(STILL, 0.1)
     before = run.outputs().sample
     run.advance(STILL, 0.19)
@@ -194,13 +202,15 @@ def test_an_adxrs450_marks_what_is_wrong_with_it_in_its_own_frame_alone(channel:
         ("spiking", adxrs450_frame.VALID, set()),
         ("lost_frames", adxrs450_frame.VALID, set()),
     ):
-        run = run_of(with_fault(GYRO, kind, channel), MOVING, END - 0.005)
+        run = run_of(with_fault(GYRO, kind, channel), MOVING, START - 0.001)
+        before = run.outputs().register.rate
+        run.advance(OTHER, END - 0.004)
         register = run.outputs().register
         for axis in range(3):
             frame = adxrs450_frame.decode_sensor_data(unsigned(register.gyro_word[axis]))
             assert frame.parity_holds
-            assert frame.code == register.rate[axis]
             mine = axis == channel
+            assert frame.code == (register.rate[axis] if kind != "lost_frames" or not mine else before[axis])
             assert frame.status == (status if mine else adxrs450_frame.VALID), kind
             assert {name for name, bit in frame.faults._asdict().items() if bit} == (named if mine else set()), kind
         assert register.status_word == 0.0
@@ -218,8 +228,8 @@ def test_frames_are_numbered_by_the_readings() -> None:
 
 def test_every_frame_of_a_noisy_run_has_odd_parity_and_the_registers_code() -> None:
     run = Run(MODEL, MODEL.Parameters(), MOVING)
-    for step in range(1, 200):
-        run.advance(MOVING, step * 0.0023)
+    for reading in range(1, 200):
+        run.advance(MOVING, reading * run.coefficients.processor_period)
         register = run.outputs().register
         for axis in range(3):
             frame = adxrs450_frame.decode_sensor_data(unsigned(register.gyro_word[axis]))
@@ -254,23 +264,79 @@ def test_an_adis16354_reports_range_and_supply() -> None:
         assert run.outputs().register.status_word == word
 
 
-def test_output_words_of_an_adis16354_carry_code_and_new_data() -> None:
-    run = Run(MODEL, faultless(ADIS, processor__period=0.004), MOVING)
+def received(run: Run) -> tuple[float, ...]:
+    register = run.outputs().register
+    return *register.gyro_word, *register.accelerometer_word
+
+
+def test_a_master_that_steps_with_the_processor_sees_which_words_are_new() -> None:
+    # words come every 1/819.2 s, readings every 1 ms: new is what has come since the reading before
+    run = Run(MODEL, faultless(ADIS, processor__period=0.001), MOVING)
     new = []
-    for step in range(1, 41):
-        run.advance(MOVING, step * 0.001)
-        register, reading = run.outputs().register, run.state.reading
-        for code, word in zip(
-            (*register.rate, *register.acceleration),
-            (*register.gyro_word, *register.accelerometer_word),
-            strict=True,
-        ):
+    for reading in range(1, 41):
+        run.advance(MOVING, reading * 0.001)
+        came = math.floor(reading * 0.8192) > math.floor((reading - 1) * 0.8192)
+        for code, word in zip(codes(run), received(run), strict=True):
             assert 0 <= word < 2**16
             assert adis16354_words.code_of_output(word) == code
-        fresh = run.state.gyro[0].words > reading.gyro_words[0]
-        assert int(register.gyro_word[0]) >> 15 == fresh
-        new.append(fresh)
+            assert int(word) >> 15 == came
+        new.append(came)
     assert set(new) == {True, False}
+
+
+@BOTH
+def test_words_are_those_of_the_last_reading_whatever_the_registers_show_since(device: str) -> None:
+    run = Run(MODEL, faultless(device, processor__period=0.02), MOVING)
+    run.advance(MOVING, 0.02)
+    words, registers = received(run), codes(run)
+    run.advance(OTHER, 0.0399)
+    assert received(run) == words
+    assert all(now != then for now, then in zip(codes(run), registers, strict=True))
+    run.advance(OTHER, 0.04)
+    assert all(now != then for now, then in zip(received(run), words, strict=True))
+
+
+@CHANNELS
+@BOTH
+def test_a_lost_word_leaves_the_one_received_before(device: str, channel: int) -> None:
+    run, plain = Run(MODEL, with_fault(device, "lost_frames", channel), MOVING), Run(MODEL, faultless(device), MOVING)
+    run.advance(MOVING, START - 0.001)
+    plain.advance(MOVING, START - 0.001)
+    last = received(run)[channel]
+    for reading in range(round(START * 500), round(START * 500) + 20):
+        for one in (run, plain):
+            one.advance(OTHER, reading * 0.002 + 0.0005)
+        assert received(run)[channel] == last
+        assert received(run)[:channel] == received(plain)[:channel]
+        assert received(run)[channel + 1 :] == received(plain)[channel + 1 :]
+    for one in (run, plain):
+        one.advance(OTHER, STOP)
+    assert received(run) == received(plain)
+
+
+@CHANNELS
+@BOTH
+def test_what_is_wrong_with_a_word_is_told_with_that_word(device: str, channel: int) -> None:
+    # dropped words are zero, saturated ones at the end: at no tick may the flag differ from what the register shows
+    for kind in ("dropped", "saturated"):
+        run, told = Run(MODEL, with_fault(device, kind, channel), MOVING), set()
+        well = codes(run)[channel]
+        for tick in range(1, 1200):
+            run.advance(MOVING, tick * 1e-4)
+            part = part_of(run, channel)
+            conditions = (part.condition,) * 3 if channel < 3 else part.condition
+            flag = conditions[channel % 3] == 2.0 if kind == "dropped" else part.over_range == 1.0
+            assert flag == (abs(codes(run)[channel] - well) > 100), tick
+            told.add(flag)
+        assert told == {True, False}
+
+
+@pytest.mark.parametrize(("volts", "failed"), [(3.1, 1.0), (3.15, 0.0), (5.0, 0.0), (5.25, 0.0), (5.3, 1.0)])
+def test_an_adxrs450_reports_a_supply_outside_its_range(volts: float, failed: float) -> None:
+    run = run_of(faultless(), MOVING._replace(supply_voltage=volts), 0.05)
+    for word in run.outputs().register.gyro_word:
+        frame = adxrs450_frame.decode_sensor_data(unsigned(word))
+        assert (frame.faults, frame.status) == (adxrs450_frame.NO_FAULTS._replace(power=failed), adxrs450_frame.VALID)
 
 
 # --- self-test -------------------------------------------------------------------------------------------------------
@@ -289,6 +355,33 @@ def test_the_self_test_adds_its_response(device: str) -> None:
         assert (during[i] - before[i]) * lsb == pytest.approx(responses[i], abs=lsb)
     run.tune(p)
     assert at(run, MOVING, 0.15) == before
+
+
+@pytest.mark.parametrize("high_pass", ["none", "corner_1"])
+@BOTH
+def test_the_self_test_goes_the_way_of_the_signal(device: str, high_pass: str) -> None:
+    # switched on, it shows what a step of rate and specific force of its size does, through every filter
+    response, pushed = (0.1, 0.2, -0.3), (1.0, -2.0, 3.0)
+    p = faultless(
+        device,
+        True,
+        gyro__self_test_response=response,
+        accelerometer__self_test_response=pushed,
+        accelerometer__high_pass=HIGH_PASS.value(high_pass),
+    )
+    tested, driven = Run(MODEL, p, STILL), Run(MODEL, p, STILL)
+    tested.tune(
+        p._replace(gyro=p.gyro._replace(self_test=True), accelerometer=p.accelerometer._replace(self_test=True))
+    )
+    shares = set()
+    for step in range(1, 60):
+        tested.advance(STILL, 0.0005 * step)
+        driven.advance(STILL._replace(rate=response, specific_force=pushed), 0.0005 * step)
+        for one, other in zip(codes(tested), codes(driven), strict=True):
+            assert abs(one - other) <= 1.0
+        shares.add(codes(tested)[0] * p.gyro.resolution / response[0])
+    assert len([share for share in shares if 0.05 < share < 0.95]) >= 2
+    assert max(shares) == pytest.approx(1.0, rel=1e-6)
 
 
 def test_the_adxl355_answers_its_self_test_as_the_sheet_says() -> None:

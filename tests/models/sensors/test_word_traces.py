@@ -61,6 +61,7 @@ SIGNALS: dict[Any, list[tuple[str, Callable[..., Any], Sequence[Draw]]]] = {
         ("fault_byte", with_faults(adxrs450_frame.fault_byte), FAULTS),
         ("self_test_fault", adxrs450_frame.self_test_fault, (whole(1000, 4000),)),
         ("self_test_invalidates", adxrs450_frame.self_test_invalidates, (whole(1000, 4000),)),
+        ("power_fault", adxrs450_frame.power_fault, (real(2.0, 6.0),)),
         ("data_status", adxrs450_frame.data_status, (BIT, BIT)),
         (
             "sensor_data_response",
@@ -99,13 +100,16 @@ SIGNALS: dict[Any, list[tuple[str, Callable[..., Any], Sequence[Draw]]]] = {
         ("supply_code", adis16354_words.supply_code, (real(-1.0, 9.0),)),
         ("auxiliary_code", adis16354_words.auxiliary_code, (real(-1.0, 3.0),)),
         ("status_word", lambda *bits: adis16354_words.status_word(adis16354_words.Status(*bits)), (BIT,) * 14),
+        ("supply_errors", adis16354_words.supply_errors, (real(4.0, 6.0),)),
         ("error_or_alarm", adis16354_words.error_or_alarm, (WORD,)),
         ("sensitivity_average_word", adis16354_words.sensitivity_average_word, (whole(1, 4), whole(0, 6))),
         ("sensitivity_average_fields", adis16354_words.sensitivity_average_fields, (WORD,)),
         ("least_exponent", adis16354_words.least_exponent, (whole(1, 4),)),
+        ("nearest_range", adis16354_words.nearest_range, (real(0.0, 7.0), whole(0, 6))),
         ("gyro_weight", adis16354_words.gyro_weight, (whole(1, 4),)),
         ("sample_period_word", adis16354_words.sample_period_word, (BIT, whole(0, 127))),
         ("sample_period", adis16354_words.sample_period, (BYTE,)),
+        ("nearest_divider", adis16354_words.nearest_divider, (whole(1, 4096),)),
         ("gyro_offset_word", adis16354_words.gyro_offset_word, (real(-2.0, 2.0),)),
         ("gyro_offset", adis16354_words.gyro_offset, (WORD,)),
         ("acceleration_offset_word", adis16354_words.acceleration_offset_word, (real(-12.0, 12.0),)),
@@ -115,8 +119,9 @@ SIGNALS: dict[Any, list[tuple[str, Callable[..., Any], Sequence[Draw]]]] = {
 PLAIN = {
     adxrs450_frame: {"decode_sensor_data", "decode_register", "decode_command"},
     adxl355_registers: {"output_data_rate", "high_pass_corner", "sensitivity"},
+    adis16354_words: {"ranges_in_words"},
 }
-"""Functions of plain integers: for tests and for choices made once."""
+"""Functions of plain numbers: for tests, for choices made once, for people."""
 
 
 @pytest.fixture(autouse=True)
