@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import signal
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from attitude_fmu.fmu_src.build_messages import build_and_tell
+from attitude_fmu.fmu_src.errors import did_you_mean
 from attitude_fmu.models.sensors.devices import DEVICES
 
 from .bench import settable
-from .errors import ResultsError, SystemRefusedError, did_you_mean
+from .design_table import Run, rows_of, show_rows, write_rows
+from .errors import ResultsError, SystemRefusedError
 from .interface import Value, read_interface
 from .jobs import Job, run_jobs
 from .recording import Results
@@ -28,7 +30,7 @@ from .report import EXPOSURE, Jitter, aligned_at, jitter
 from .scenarios import WIND_SPEED
 from .ssp import write_ssp
 from .system import Component, ParameterSet, System, connect
-from .workspace import claimed, whole_or_not
+from .workspace import claimed
 
 IDEAL = "ideal"
 SENSORS = ("ADXRS450_ADXL355", "ADIS16354_150", IDEAL)
@@ -51,7 +53,6 @@ _OURS = {
     "sensor.processor.period": "it follows from the sensor's clock",
     "sensor.ideal": "ask for --sensor ideal",
 }
-CAUSES = ("wind", "friction", "gyro noise", "accelerometer noise", "rounding")
 _TABLE, _OVERVIEW, _LOOPS = "design.csv", "design_overview.png", "design_loops.png"
 
 
@@ -66,21 +67,16 @@ class DesignRequest(NamedTuple):
     dist: Path
 
 
-class Run(NamedTuple):
-    """A co-simulation: which sensor and controller, its results and its jitter."""
-
-    label: str
-    kind: str
-    results: Results
-    jitter: Jitter
-    since: float
-
-
 def show_design(request: DesignRequest) -> None:
     """Design, export, co-simulate and compare; write everything into the folder and print the table.
 
     Raises `SystemRefusedError`, `LinearisationRefusedError`, `RunStoppedError`, `ResultsError` or `BuildError`.
     """
+    if request.stop < _SETTLING + EXPOSURE:
+        raise SystemRefusedError(
+            f"--stop {request.stop:g}: jitter is counted in exposures of {EXPOSURE:g} s, from {_SETTLING:g} s after "
+            "the sensor's alignment; choose 20 s or more"
+        )
     plant, sensor = _parameters(request.settings)
     chosen = [_sensor(name, sensor) for name in request.sensors]
     console = Console(stderr=True)
@@ -149,12 +145,12 @@ def _designed(sensors: list[Any], plant: Mapping[str, float], out: Path, bars: P
     groups: dict[Any, list[Any]] = {}
     for sensor in sensors:
         groups.setdefault(clocks_of(sensor.fmu, sensor.parameters), []).append(sensor)
-    with _one_thread_each(), get_context("spawn").Pool(_TOGETHER, _ignore_interrupts) as pool:
+    with _one_thread_each(), get_context("spawn").Pool(min(_TOGETHER, len(groups)), _ignore_interrupts) as pool:
         tasks = {}
         for clocks, group in groups.items():
             shown = bars.add_task(f"designing for {', '.join(one.label for one in group)}", total=None)
             tasks[shown] = pool.apply_async(design_head, (tuple(group), clocks, plant, out))
-        found = {}
+        found: dict[str, Any] = {}
         for shown, task in tasks.items():
             found |= {design.sensor.label: design for design in task.get()}
             bars.remove_task(shown)
@@ -241,12 +237,16 @@ def _simulated(designs: list[Any], request: DesignRequest, bars: Progress) -> li
         for first in range(0, len(jobs), _TOGETHER):
             pair = jobs[first : first + _TOGETHER]
             shown = {job.name: bars.add_task(f"co-simulating {job.name}", total=job.stop_time) for job in pair}
-            outcomes = run_jobs(pair, lambda name, time, shown=shown: bars.update(shown[name], completed=time))
+            outcomes = run_jobs(pair, partial(_advance, bars, shown))
             for (design, controller), job in zip(wanted[first:], pair, strict=False):
                 kind = "held" if controller is None else controller.kind
                 runs.append(_run(design.sensor.label, kind, outcomes[job.name].results))
                 bars.remove_task(shown[job.name])
     return runs
+
+
+def _advance(bars: Progress, shown: Mapping[str, TaskID], name: str, time: float) -> None:
+    bars.update(shown[name], completed=time)
 
 
 def _whole(duration: float, period: float) -> float:
@@ -263,90 +263,42 @@ def _run(label: str, kind: str, results: Results) -> Run:
             f"{kind} with {label}: no whole exposure after the sensor's alignment and {_SETTLING:g} s; choose a longer "
             "--stop"
         )
-    return Run(label, kind, results, found, since)
+    return Run(label, kind, results, found, _standard_error(results, since, found), since)
+
+
+def _standard_error(results: Results, since: float, found: Jitter) -> float:
+    """std(squares)/(2 rms sqrt(n)) of an rms over n exposures, which count as independent of each other."""
+    if found.exposures == 1:
+        return float("nan")
+    squares = []
+    for number in range(found.exposures):
+        begin = since + number * EXPOSURE
+        # up to within the next one: the last record may lie at the exposure's end but for rounding
+        near = (results["time"] > begin - 1e-6) & (results["time"] < begin + 1.5 * EXPOSURE)
+        one = jitter(results[near], "plant", begin)
+        assert one is not None
+        squares.append(one.rms**2)
+    return float(np.std(squares, ddof=1) / (2.0 * found.rms * np.sqrt(found.exposures)))
 
 
 # --- showing --------------------------------------------------------------------------------------------------------
 
 
-_HEAD = (
-    *("sensor", "controller", "predicted (urad)", "co-simulated (urad)", "predicted / co-simulated", "held / this"),
-    *("disk margin", "least phase margin (deg)", "least gain margin (dB)", "crossover of pitch (Hz)", "states"),
-    *("before reduction (urad)", "own radius", *[f"{cause} (urad)" for cause in CAUSES]),
-)
-_FIRST, _SECOND = (*_HEAD[:9],), (*_HEAD[:2], *_HEAD[13:])
-_SHORT = {
-    "predicted (urad)": "predicted\nµrad",
-    "co-simulated (urad)": "simulated\nµrad",
-    "predicted / co-simulated": "ratio",
-    "held / this": "gain over\nheld",
-    "disk margin": "disk\nmargin",
-    "least phase margin (deg)": "phase\ndeg",
-    "least gain margin (dB)": "gain\ndB",
-}
-
-
-def rows_of(designs: list[Any], runs: list[Run]) -> list[dict[str, str]]:
-    """The table: jitter of the line of sight within exposures, predicted and co-simulated, and what makes it."""
-    simulated = {(run.label, run.kind): run.jitter.rms for run in runs}
-    held = runs[0].jitter.rms
-    first = designs[0]
-    rows = [_row("joints held", "held", _size(first.held), held, held)]
-    for design in designs:
-        for one in design.controllers:
-            row = _row(design.sensor.label, one.kind, _size(one.jitter), simulated[design.sensor.label, one.kind], held)
-            row |= {f"{cause} (urad)": f"{1e6 * _size(value):.1f}" for cause, value in one.causes.items()}
-            least = min(margin.phase for margin in one.margins)
-            gains = [min(margin.gain_up, 1.0 / max(margin.gain_down, 1e-9)) for margin in one.margins]
-            row |= {
-                "states": str(one.order),
-                "disk margin": f"{one.disk.min():.2f}",
-                "least phase margin (deg)": f"{np.degrees(least):.0f}",
-                "least gain margin (dB)": f"{20.0 * np.log10(min(gains)):.1f}",
-                "crossover of pitch (Hz)": f"{one.margins[1].crossover:.1f}",
-                "before reduction (urad)": f"{1e6 * _size(one.whole):.1f}",
-                "own radius": f"{one.own_radius:.3f}",
-            }
-            rows.append(row)
-    return rows
-
-
-def _row(sensor: str, kind: str, predicted: float, simulated: float, held: float) -> dict[str, str]:
-    numbers = (1e6 * predicted, 1e6 * simulated)
-    shown = [*[f"{number:.1f}" for number in numbers], f"{predicted / simulated:.2f}", f"{held / simulated:.1f}"]
-    return dict(zip(_HEAD, [sensor, kind, *shown], strict=False))
-
-
-def _size(jitter: Any) -> float:
-    return float(np.hypot(jitter[0], jitter[1]))
+def _wind(request: DesignRequest) -> float:
+    return float(request.settings.get("plant.wind.speed", WIND_SPEED))
 
 
 def _write(request: DesignRequest, designs: list[Any], runs: list[Run]) -> None:
     from .design_plot import plot_loops, plot_overview
 
-    with whole_or_not(request.out / _TABLE) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, _HEAD, restval="")
-        table.writeheader()
-        table.writerows(rows_of(designs, runs))
-    plot_overview(request.out / _OVERVIEW, designs, runs)
+    write_rows(request.out / _TABLE, rows_of(designs, runs))
+    plot_overview(request.out / _OVERVIEW, designs, runs, _wind(request))
     plot_loops(request.out / _LOOPS, designs[0])
 
 
 def _tell(request: DesignRequest, designs: list[Any], runs: list[Run]) -> None:
-    from rich.table import Table
-
-    rows = rows_of(designs, runs)
-    wind = f"{float(request.settings.get('plant.wind.speed', WIND_SPEED)):g} m/s of wind"
     console = Console()
-    titles = (f"Jitter of the line of sight in exposures of {EXPOSURE:g} s, {wind}", "What makes it, predicted, µrad")
-    for title, columns, shown in zip(titles, (_FIRST, _SECOND), (rows, rows[1:]), strict=True):
-        table = Table(title=title, title_style="bold", title_justify="left")
-        for name in columns:
-            head = _SHORT.get(name, name.removesuffix(" (urad)").replace(" noise", "\nnoise"))
-            table.add_column(head, justify="left" if name in _HEAD[:2] else "right", no_wrap=name not in _HEAD[:1])
-        for row in shown:
-            table.add_row(*[row.get(name, "") for name in columns])
-        console.print(table)
+    show_rows(console, rows_of(designs, runs), _wind(request))
     files = [_TABLE, _OVERVIEW, _LOOPS, *[f"{one.fmu.name}" for design in designs for one in design.controllers]]
     line = f"In {request.out}: {', '.join(files)}, and the systems as .ssp"
     console.print(line, highlight=False, markup=False, soft_wrap=True)

@@ -85,7 +85,7 @@ class Designs(NamedTuple):
     frequencies: Array
     held: Array
     held_spectrum: Array
-    held_compliance: Array
+    free_compliance: Array
     controllers: tuple[Design, ...]
     delays: tuple[Delay, ...]
 
@@ -117,12 +117,12 @@ def design_head(
         register = register_response(model, clocks, {**sensor.parameters}, f)
         delays = delay_budget(head, AXES.index("pitch"), designs[-1].margins[1].crossover, register)
         motion = exposure_jitter(held, head)
-        found.append(Designs(sensor, clocks, f, motion, held, _open_compliance(head), designs, tuple(delays)))
+        found.append(Designs(sensor, clocks, f, motion, held, _free_compliance(head), designs, tuple(delays)))
     return found
 
 
-def _open_compliance(head: Head) -> Array:
-    """|angle/torque| of each axis with the motors off: frequencies x axes."""
+def _free_compliance(head: Head) -> Array:
+    """|angle/torque| (rad/N.m) of each axis with the motors off: frequencies x axes."""
     return np.abs(np.diagonal(head.mean.torque[:, LINE], axis1=1, axis2=2))
 
 

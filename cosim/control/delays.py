@@ -38,7 +38,6 @@ def delay_budget(head: Head, axis: int, crossover: float, register: Complex) -> 
         "processor: reading the word": whole - word,
         "torque held between ticks": hold,
         "motor driver, friction, structure": plant - hold,
-        "coupling: sensor and controller step after the plant": 0.0,
     }
     return [Delay(part, phase / turn, phase) for part, phase in parts.items()]
 

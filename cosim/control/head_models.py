@@ -107,8 +107,10 @@ def plant_model(clocks: Clocks, parameters: Mapping[str, float]) -> PlantModel:
     return PlantModel(point, mean, tuple(_plant_noise(one, allow_drift=True) for one in points) or (mean,))
 
 
-def _plant_noise(point: OperatingPoint, **options: bool) -> ModelNoise:
-    return model_noise(PLANT, point.dt, operating_point=point, inputs=TORQUE, outputs=PLANT_OUTPUTS, **options)
+def _plant_noise(point: OperatingPoint, allow_drift: bool = False) -> ModelNoise:
+    return model_noise(
+        PLANT, point.dt, operating_point=point, inputs=TORQUE, outputs=PLANT_OUTPUTS, allow_drift=allow_drift
+    )
 
 
 def _sigma_points(noise: ModelNoise, wind: list[int]) -> list[Array]:
@@ -127,7 +129,7 @@ def _sigma_points(noise: ModelNoise, wind: list[int]) -> list[Array]:
 
 
 def _with_wind(point: OperatingPoint, labels: list[str], change: Array) -> OperatingPoint:
-    kind = type(point.state)
+    kind: Any = type(point.state)
     names = [leaf.name for leaf in leaves(kind)]
     values = np.array(flatten(point.state), float)
     values[[names.index(label) for label in labels]] += change

@@ -161,7 +161,7 @@ def pid_design(head: Head) -> list[Pid]:
                 break
         else:
             raise LinearisationRefusedError(
-                f"no PID of {name} has a peak of |S| below {PEAK:g}: the sensor is too late for this head; choose a "
-                "faster processor.period, or a sensor with less delay"
+                f"no PID of {name} has a peak of |S| below {PEAK:g}: the sensor is too late for this head; choose "
+                "one with less delay"
             )
     return pids

@@ -45,6 +45,7 @@ class Cost(NamedTuple):
     effort: Array
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def riccati(A: Array, G: Array, Q: Array) -> Array:
     """X = A' X (1 + G X)^-1 A + Q, G = B R^-1 B', by doubling.
 
@@ -61,9 +62,9 @@ def riccati(A: Array, G: Array, Q: Array) -> Array:
         change = a.T @ h @ across
         a, g, h = a @ across, g + a @ spread @ a.T, h + change
         g, h = 0.5 * (g + g.T), 0.5 * (h + h.T)
-        if not np.isfinite(h).all():
+        if not (np.isfinite(a).all() and np.isfinite(g).all() and np.isfinite(h).all()):
             break
-        if np.linalg.norm(change) < _CONVERGED * np.linalg.norm(h):
+        if linalg.norm(change) < _CONVERGED * linalg.norm(h):
             return np.asarray(h / np.outer(scale, scale))
     raise LinearisationRefusedError(
         "no stabilising solution: a mode that does not decay is not reached by the torques, or not seen by the readings"
@@ -106,7 +107,7 @@ def estimator(plant: Plant) -> tuple[Array, Array]:
     """M of the corrected estimate xf = xp + M (y - C xp), and the standard deviations of y - C xp."""
     Y = riccati(plant.A.T, plant.C.T @ np.linalg.solve(plant.R, plant.C), plant.W)
     spread = plant.C @ Y @ plant.C.T + plant.R
-    return np.linalg.solve(spread, plant.C @ Y).T, np.sqrt(np.diag(spread))
+    return np.asarray(np.linalg.solve(spread, plant.C @ Y).T), np.asarray(np.sqrt(np.diag(spread)))
 
 
 def lqg(plant: Plant, gain: tuple[Array, Array, Array], correction: Array) -> Observer:
@@ -141,6 +142,7 @@ def truncated(observer: Observer, order: int, readings: Array, efforts: Array) -
     return Observer(back @ f @ T, back @ (Gy / size[:, None]), back @ (Gu / size[:, None]), h @ T, J)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def gramian_root(A: Array, B: Array) -> Array:
     """Z with Z Z' = P = A P A' + B B', by doubling; the root itself, so that small directions keep their digits.
 
@@ -148,11 +150,10 @@ def gramian_root(A: Array, B: Array) -> Array:
     """
     Z = B
     for _ in range(_DOUBLINGS):
-        further = A @ Z
-        Z = np.linalg.qr(np.hstack([Z, further]).T, mode="r").T
-        if not np.isfinite(Z).all():
+        further, A = A @ Z, A @ A
+        if not (np.isfinite(further).all() and np.isfinite(A).all()):
             break
-        if np.linalg.norm(further) < _CONVERGED * np.linalg.norm(Z):
+        Z = np.asarray(np.linalg.qr(np.hstack([Z, further]).T, mode="r")).T
+        if linalg.norm(further) < _CONVERGED * linalg.norm(Z):
             return np.asarray(Z)
-        A = A @ A
     raise LinearisationRefusedError("an unstable system has no Gramian")

@@ -23,18 +23,18 @@ def response(A: Array, B: Array, C: Array, D: Array | float, frequencies: Array,
     scale = balancing(A, B, C)
     T, U = linalg.schur(A * scale / scale[:, None], output="complex")
     b, c = U.conj().T @ (B / scale[:, None]), (C * scale) @ U
-    found = np.empty((len(frequencies), c.shape[0], b.shape[1]), complex)
+    found: Complex = np.empty((len(frequencies), c.shape[0], b.shape[1]), complex)
     place = np.diag_indices(len(T))
     shifted = -T
     for k, z in enumerate(np.exp(2j * np.pi * frequencies * dt)):
         shifted[place] = z - T[place]
         found[k] = c @ linalg.solve_triangular(shifted, b, check_finite=False)
-    return found + D
+    return np.asarray(found + D)
 
 
 def density(H: Complex, covariance: Array, dt: float) -> Array:
     """2 dt diag(H Q H'): one-sided spectral density of each output for white noise of covariance Q a step."""
-    return 2.0 * dt * np.einsum("fij,jk,fik->fi", H, covariance, H.conj()).real
+    return np.asarray(2.0 * dt * np.einsum("fij,jk,fik->fi", H, covariance, H.conj()).real)
 
 
 def exposure_share(frequencies: Array, exposure: float, dt: float) -> Array:
@@ -44,7 +44,8 @@ def exposure_share(frequencies: Array, exposure: float, dt: float) -> Array:
     """
     samples = round(exposure / dt)
     below = samples * np.sin(np.pi * frequencies * dt)
-    return 1.0 - (np.sin(np.pi * frequencies * samples * dt) / np.where(below == 0.0, 1.0, below)) ** 2
+    kept = np.sin(np.pi * frequencies * samples * dt) / np.where(below == 0.0, 1.0, below)
+    return np.asarray(1.0 - np.where(below == 0.0, 1.0, kept) ** 2)
 
 
 def jitter_of(spectrum: Array, frequencies: Array, exposure: float, dt: float) -> Array:
