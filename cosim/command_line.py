@@ -356,6 +356,58 @@ def calibrate_command(
         calibrate(CalibrationRequest(device, specimen, out, dist, quick, settings))
 
 
+DESIGN_HELP = """Design the stabilisation of the camera's line of sight, and prove it.
+
+Linearises the head in its wind and the sensor, shapes a PID and an LQG on the true loop with its noise and delay, \
+exports both as FMUs, co-simulates them, and lays the predicted jitter of the line of sight beside the co-simulated one.
+
+Written into the output folder: \
+design_overview.png and design_loops.png (the pictures), \
+design.csv (the table that is shown), \
+the controllers as .fmu and the coupled systems as .ssp.
+
+[bold]Examples[/bold]
+
+  attitude-fmu design
+
+  attitude-fmu design --quick --out quick
+
+  attitude-fmu design --sensor ADXRS453_ADXL355 --sensor ideal --set plant.wind.speed=6
+"""
+
+
+@application.command("design", help=DESIGN_HELP)
+def design_command(
+    sensors: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sensor", metavar="DEVICE", help="A device, or ideal. Repeatable; by default the two papers' and ideal."
+        ),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder for all that is written; made if missing.")
+    ] = Path("out"),
+    quick: Annotated[bool, typer.Option("--quick", help="One sensor, 30 s of co-simulation.")] = False,
+    stop: Annotated[float | None, typer.Option(metavar="S", help="Duration of the co-simulations in s.")] = None,
+    values: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="NAME=VALUE", help="A number: a parameter of plant or sensor, in SI units. Repeatable."
+        ),
+    ] = None,
+    dist: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder of the FMUs, which are built where missing or stale.")
+    ] = Path("dist"),
+) -> None:
+    """Design the stabilisation of the camera's line of sight, and prove it."""
+    with _reported():
+        from .design import SENSORS, DesignRequest, show_design
+
+        chosen = tuple(dict.fromkeys(sensors or (SENSORS[:1] if quick else SENSORS)))
+        duration = stop or (30.0 if quick else 120.0)
+        show_design(DesignRequest(chosen, out, duration, _settings(values or []), dist))
+
+
 def _show_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"attitude-fmu {version('attitude-fmu')}")
