@@ -364,7 +364,8 @@ exports both as FMUs, co-simulates them, and lays the predicted jitter of the li
 Written into the output folder: \
 design_overview.png and design_loops.png (the pictures), \
 design.csv (the table that is shown), \
-the controllers as .fmu and the coupled systems as .ssp.
+the controllers as .fmu, the coupled systems as .ssp, \
+and runs (each co-simulation's line of sight).
 
 [bold]Examples[/bold]
 
@@ -387,8 +388,12 @@ def design_command(
     out: Annotated[
         Path, typer.Option(metavar="FOLDER", help="Folder for all that is written; made if missing.")
     ] = Path("out"),
-    quick: Annotated[bool, typer.Option("--quick", help="One sensor, 30 s of co-simulation.")] = False,
-    stop: Annotated[float | None, typer.Option(metavar="S", help="Duration of the co-simulations in s.")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="The first sensor only if none is named, 30 s of co-simulation.")
+    ] = False,
+    stop: Annotated[
+        float | None, typer.Option(metavar="S", help="Duration of the co-simulations in s; 120, or 30 with --quick.")
+    ] = None,
     values: Annotated[
         list[str] | None,
         typer.Option(
@@ -404,8 +409,9 @@ def design_command(
         from .design import SENSORS, DesignRequest, show_design
 
         chosen = tuple(dict.fromkeys(sensors or (SENSORS[:1] if quick else SENSORS)))
-        duration = stop or (30.0 if quick else 120.0)
-        show_design(DesignRequest(chosen, out, duration, _settings(values or []), dist))
+        if stop is None:
+            stop = 30.0 if quick else 120.0
+        show_design(DesignRequest(chosen, out, stop, _settings(values or []), dist))
 
 
 def _show_version(wanted: bool) -> None:

@@ -18,13 +18,14 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 from attitude_fmu.fmu_src.build_messages import build_and_tell
 from attitude_fmu.fmu_src.errors import did_you_mean
+from attitude_fmu.models.errors import AttitudeFmuError
 from attitude_fmu.models.sensors.devices import DEVICES
 
 from .bench import settable
 from .design_table import Run, rows_of, show_rows, write_rows
 from .errors import ResultsError, SystemRefusedError
 from .interface import Value, read_interface
-from .jobs import Job, run_jobs
+from .jobs import Job, portable, run_jobs
 from .recording import Results
 from .report import EXPOSURE, Jitter, aligned_at, jitter
 from .scenarios import WIND_SPEED
@@ -53,6 +54,7 @@ _OURS = {
     "sensor.processor.period": "it follows from the sensor's clock",
     "sensor.ideal": "ask for --sensor ideal",
 }
+_RUNS = "runs"
 _TABLE, _OVERVIEW, _LOOPS = "design.csv", "design_overview.png", "design_loops.png"
 
 
@@ -72,22 +74,20 @@ def show_design(request: DesignRequest) -> None:
 
     Raises `SystemRefusedError`, `LinearisationRefusedError`, `RunStoppedError`, `ResultsError` or `BuildError`.
     """
-    if request.stop < _SETTLING + EXPOSURE:
-        raise SystemRefusedError(
-            f"--stop {request.stop:g}: jitter is counted in exposures of {EXPOSURE:g} s, from {_SETTLING:g} s after "
-            "the sensor's alignment; choose 20 s or more"
-        )
     plant, sensor = _parameters(request.settings)
     chosen = [_sensor(name, sensor) for name in request.sensors]
     console = Console(stderr=True)
     names = [PLANT, HOLD, *dict.fromkeys(one.fmu for one in chosen)]
     build_and_tell(request.dist, names, console, only_built=True, option="--fmu")
     _check_settings(request, chosen)
+    _check_stop(request.stop, chosen)
     try:
         request.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ResultsError(f"cannot write into {request.out}: {error.strerror or error}") from error
     with claimed(request.out), _stages() as bars:
+        for name in (_TABLE, _OVERVIEW, _LOOPS):  # of an earlier design
+            (request.out / name).unlink(missing_ok=True)
         designs = _designed(chosen, plant, request.out, bars)
         runs = _simulated(designs, request, bars)
         bars.add_task("drawing", total=None)
@@ -123,6 +123,19 @@ def _check_settings(request: DesignRequest, sensors: list[Any]) -> None:
             settable(read_interface(request.dist / f"{fmu}.fmu"), variable).value(text)
 
 
+def _check_stop(stop: float, sensors: list[Any]) -> None:
+    """Raise `SystemRefusedError` where no whole exposure would be left."""
+    from .control.stepping import model_called, parameters_with
+
+    aligned = max(parameters_with(model_called(one.fmu), one.parameters).alignment.duration for one in sensors)
+    least = aligned + _SETTLING + 2.0 * EXPOSURE
+    if not least <= stop < float("inf"):
+        raise SystemRefusedError(
+            f"--stop {stop:g}: jitter is counted in exposures of {EXPOSURE:g} s, from {_SETTLING:g} s after the "
+            f"sensor's alignment of {aligned:g} s; choose {least:g} s or more"
+        )
+
+
 def _sensor(name: str, parameters: Mapping[str, float]) -> Any:
     from .head_design import Sensor
 
@@ -140,21 +153,47 @@ def _sensor(name: str, parameters: Mapping[str, float]) -> Any:
 def _designed(sensors: list[Any], plant: Mapping[str, float], out: Path, bars: Progress) -> list[Any]:
     """The designs in the order of the sensors; sensors of the same clocks share a process."""
     from .control.head_models import clocks_of
-    from .head_design import design_head
 
     groups: dict[Any, list[Any]] = {}
     for sensor in sensors:
         groups.setdefault(clocks_of(sensor.fmu, sensor.parameters), []).append(sensor)
-    with _one_thread_each(), get_context("spawn").Pool(min(_TOGETHER, len(groups)), _ignore_interrupts) as pool:
+    with (
+        tempfile.TemporaryDirectory(prefix=".design_", dir=out) as folder,
+        _one_thread_each(),
+        get_context("spawn").Pool(min(len(groups), _TOGETHER), _ignore_interrupts) as pool,
+    ):
         tasks = {}
         for clocks, group in groups.items():
             shown = bars.add_task(f"designing for {', '.join(one.label for one in group)}", total=None)
-            tasks[shown] = pool.apply_async(design_head, (tuple(group), clocks, plant, out))
+            tasks[shown] = pool.apply_async(_design, (tuple(group), clocks, plant, Path(folder)))
         found: dict[str, Any] = {}
         for shown, task in tasks.items():
-            found |= {design.sensor.label: design for design in task.get()}
+            answer = task.get()
+            if isinstance(answer, AttitudeFmuError):
+                raise answer
+            found |= {design.sensor.label: _moved(design, out) for design in answer}
             bars.remove_task(shown)
     return [found[sensor.label] for sensor in sensors]
+
+
+def _design(sensors: tuple[Any, ...], clocks: Any, plant: Mapping[str, float], folder: Path) -> Any:
+    """`design_head` in a process of its own, from which not every error could come back."""
+    from .head_design import design_head
+
+    try:
+        return design_head(sensors, clocks, plant, folder)
+    except AttitudeFmuError as error:
+        return portable(error)
+
+
+def _moved(design: Any, folder: Path) -> Any:
+    """The design with its controllers' FMUs in the folder."""
+    controllers = []
+    for one in design.controllers:
+        path = folder / one.fmu.name
+        one.fmu.replace(path)
+        controllers.append(one._replace(fmu=path))
+    return design._replace(controllers=tuple(controllers))
 
 
 def _ignore_interrupts() -> None:
@@ -225,23 +264,23 @@ def _simulated(designs: list[Any], request: DesignRequest, bars: Progress) -> li
     wanted = [(designs[0], None), *[(design, controller) for design in designs for controller in design.controllers]]
     settings: dict[str, Value] = dict(request.settings)
     runs = []
-    with tempfile.TemporaryDirectory(prefix=".design_", dir=request.out) as folder:
-        jobs = []
-        for design, controller in wanted:
-            system = head_system(design, controller, settings, request.dist, _whole(request.stop, design.clocks.period))
-            write_ssp(system, request.out / f"{system.name}.ssp")
-            results = Path(folder) / f"{system.name}.csv"
-            record = ("plant.euler.*", "sensor.aligned")
-            assert system.stop_time is not None
-            jobs.append(Job(system.name, system, results, system.stop_time, design.clocks.period, record=record))
-        for first in range(0, len(jobs), _TOGETHER):
-            pair = jobs[first : first + _TOGETHER]
-            shown = {job.name: bars.add_task(f"co-simulating {job.name}", total=job.stop_time) for job in pair}
-            outcomes = run_jobs(pair, partial(_advance, bars, shown))
-            for (design, controller), job in zip(wanted[first:], pair, strict=False):
-                kind = "held" if controller is None else controller.kind
-                runs.append(_run(design.sensor.label, kind, outcomes[job.name].results))
-                bars.remove_task(shown[job.name])
+    folder = request.out / _RUNS
+    folder.mkdir(exist_ok=True)
+    jobs = []
+    for design, controller in wanted:
+        system = head_system(design, controller, settings, request.dist, _whole(request.stop, design.clocks.period))
+        write_ssp(system, request.out / f"{system.name}.ssp")
+        assert system.stop_time is not None
+        record, results = ("plant.euler.*", "sensor.aligned"), folder / f"{system.name}.csv"
+        jobs.append(Job(system.name, system, results, system.stop_time, design.clocks.period, record=record))
+    for first in range(0, len(jobs), _TOGETHER):
+        pair = jobs[first : first + _TOGETHER]
+        shown = {job.name: bars.add_task(f"co-simulating {job.name}", total=job.stop_time) for job in pair}
+        outcomes = run_jobs(pair, partial(_advance, bars, shown))
+        for (design, controller), job in zip(wanted[first:], pair, strict=False):
+            kind = "held" if controller is None else controller.kind
+            runs.append(_run(design.sensor.label, kind, outcomes[job.name].results))
+            bars.remove_task(shown[job.name])
     return runs
 
 
@@ -300,7 +339,7 @@ def _tell(request: DesignRequest, designs: list[Any], runs: list[Run]) -> None:
     console = Console()
     show_rows(console, rows_of(designs, runs), _wind(request))
     files = [_TABLE, _OVERVIEW, _LOOPS, *[f"{one.fmu.name}" for design in designs for one in design.controllers]]
-    line = f"In {request.out}: {', '.join(files)}, and the systems as .ssp"
+    line = f"In {request.out}: {', '.join(files)}, the systems as .ssp, and {_RUNS}"
     console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 

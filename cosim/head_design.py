@@ -12,6 +12,8 @@ from typing import NamedTuple
 import control  # type: ignore[import-untyped]
 import numpy as np
 
+from attitude_fmu.models.gimbal_controller import Parameters
+
 from .control.conditioning import Array
 from .control.delays import Delay, delay_budget, register_response
 from .control.export import to_fmu
@@ -32,7 +34,17 @@ from .control.head_pid import pid_controller, pid_design
 from .control.margins import Margins
 from .control.operating_point import OperatingPoint
 from .control.responses import Complex
-from .control.stabilised_head import CAUSES, Controller, Head, Loop, closed_loop, exposure_jitter, grid, head_of
+from .control.stabilised_head import (
+    CAUSES,
+    Controller,
+    Head,
+    Loop,
+    check_gusts,
+    closed_loop,
+    exposure_jitter,
+    grid,
+    head_of,
+)
 
 UNITS = {"rate_measured": "rad/s", "specific_force_measured": "m/s2", "joint": "rad", TORQUE: "N.m"}
 """Of a controller's signals."""
@@ -43,8 +55,8 @@ SIGNALS = (
 )
 """What controllers may read: gyros, accelerometers, encoders."""
 
-TORQUE_LIMIT = 0.5
-"""N.m; of the motors, as `GimbalController` has it."""
+TORQUE_LIMIT = Parameters().torque_limit.yaw
+"""N.m; of the motors."""
 
 
 class Sensor(NamedTuple):
@@ -127,6 +139,7 @@ def _free_compliance(head: Head) -> Array:
 
 
 def _design(kind: str, controller: Controller, loop: Loop, whole: Loop | None, plant: PlantModel, path: Path) -> Design:
+    check_gusts(loop.head, controller)
     fmu, inputs = _exported(controller, plant.point, path)
     causes = {cause: loop.jitter(cause) for cause in CAUSES}
     return Design(

@@ -133,7 +133,7 @@ def _work(job: Job, workspace: Path, messages: Connection, stop: Any) -> None:
             outcome = run_plan(job.system, check_job(job), job.results, tell, workspace, close)
         answer = _Answer(outcome, None)
     except AttitudeFmuError as error:
-        answer = _Answer(None, _portable(error))
+        answer = _Answer(None, portable(error))
     except Exception as error:
         traceback.print_exc(file=heard)
         answer = _Answer(None, AttitudeFmuError(f"internal error: {type(error).__name__}: {error}"))
@@ -158,7 +158,8 @@ class _Heard(io.TextIOBase):
                 print(line, file=sys.stderr)
 
 
-def _portable(error: AttitudeFmuError) -> AttitudeFmuError:
+def portable(error: AttitudeFmuError) -> AttitudeFmuError:
+    """The error, or its message alone where it would not come through to another process."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:  # an error whose class wants more than its message

@@ -31,7 +31,7 @@ DISK = 0.6
 """Disk margin that is asked for: 33 degrees or 5.4 dB, in all three loops at once."""
 
 _REDUCED = 0.02
-"""By how much the reduced controller's jitter may be larger and its disk margin smaller."""
+"""By how much the reduced controller's jitter may be larger."""
 
 _ORDERS = range(30, 151, 5)
 
@@ -41,9 +41,6 @@ _RATE, _FORCE = 1e-4, 1e-3
 _WEIGHTS = (1.0, 1.0, 0.3)
 """Of yaw, pitch and roll; the roll turns the picture but not the line of sight, assumption."""
 
-_THINNED = 3
-"""Every third frequency does for comparing designs."""
-
 _LEAK = 0.1
 """Weight of the angle itself beside its motion within exposures: the head stays where it points."""
 
@@ -52,11 +49,10 @@ _EFFORT = 4e-3
 
 
 class Lqg(NamedTuple):
-    """The controller, and the loop of the one from which it was reduced, of `order` states."""
+    """The controller, its loop, and the loop of the one from which it was reduced."""
 
     controller: Controller
     loop: Loop
-    order: int
     whole: Loop
 
 
@@ -65,14 +61,15 @@ def lqg_design(head: Head, friction: Friction) -> Lqg:
 
     Raises `LinearisationRefusedError` where none has them.
     """
-    thin = head.thinned(_THINNED)
     best = 0.0
     for torque in TORQUES:
         observer, readings, torques = _designed(head, friction, torque)
-        loop = closed_loop(thin, _controller(observer))
+        loop = closed_loop(head, _controller(observer))
+        if loop.radius >= 1.0:
+            continue
         best = max(best, float(loop.disk.min()))
-        if loop.radius < 1.0 and loop.disk.min() >= DISK:
-            return _reduced(head, observer, readings, torques)
+        if best >= DISK:
+            return _reduced(loop, observer, readings, torques)
     raise LinearisationRefusedError(
         f"no LQG has a disk margin of {DISK:g}, the best has {best:.2g}: the sensor is too late for this head; choose "
         "a sensor with less delay, or a stiffer ball head"
@@ -83,21 +80,16 @@ def _controller(observer: Observer) -> Controller:
     return Controller(*observer.controller(), observer.Gu)
 
 
-def _reduced(head: Head, observer: Observer, readings: Array, torques: Array) -> Lqg:
-    whole = closed_loop(head, _controller(observer))
-    thin = head.thinned(_THINNED)
-    reference = closed_loop(thin, _controller(observer))
-    wanted = reference.disk.min() * (1.0 - _REDUCED), line_of_sight(reference.jitter()) * (1.0 + _REDUCED)
-    order = len(observer.F)
-    for smaller in _ORDERS:
-        if smaller >= len(observer.F):
+def _reduced(whole: Loop, observer: Observer, readings: Array, torques: Array) -> Lqg:
+    largest = line_of_sight(whole.jitter()) * (1.0 + _REDUCED)
+    for order in _ORDERS:
+        if order >= len(observer.F):
             break
-        loop = closed_loop(thin, _controller(truncated(observer, smaller, readings, torques)))
-        if loop.radius < 1.0 and loop.disk.min() >= wanted[0] and line_of_sight(loop.jitter()) <= wanted[1]:
-            order = smaller
-            break
-    controller = _controller(truncated(observer, order, readings, torques))
-    return Lqg(controller, closed_loop(head, controller), order, whole)
+        controller = _controller(truncated(observer, order, readings, torques))
+        loop = closed_loop(whole.head, controller)
+        if loop.radius < 1.0 and loop.disk.min() >= DISK and line_of_sight(loop.jitter()) <= largest:
+            return Lqg(controller, loop, whole)
+    return Lqg(_controller(observer), whole, whole)
 
 
 def _designed(head: Head, friction: Friction, torque: float) -> tuple[Observer, Array, Array]:

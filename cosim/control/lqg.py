@@ -14,10 +14,13 @@ import numpy as np
 from scipy import linalg  # type: ignore[import-untyped]
 
 from ..errors import LinearisationRefusedError
-from .conditioning import Array, balancing
+from .conditioning import Array, balancing, radius
 
 _DOUBLINGS = 60
 _CONVERGED = 1e-12
+_GROWING = 1.0 + 1e-7
+"""Magnitude above which a pole grows; a random walk has 1, to rounding."""
+
 _NOTHING = 1e-14
 """Part of the largest Hankel singular value that is rounding."""
 
@@ -52,10 +55,11 @@ def riccati(A: Array, G: Array, Q: Array) -> Array:
     Accurate where eigenvalues lie near the unit circle, as those of slow noise do. Source: Chu, Fan, Lin, Wang,
     "Structure-preserving algorithms for periodic discrete-time algebraic Riccati equations", Int. J. Control 77 (2004).
 
-    Raises `LinearisationRefusedError` where it does not converge: the plant cannot be stabilised, or not be seen.
+    Raises `LinearisationRefusedError` where there is none: the plant cannot be stabilised, or not be seen.
     """
     scale = balancing(A, np.diag(np.sqrt(np.diag(G))), np.diag(np.sqrt(np.diag(Q))))
     a, g, h = A * scale / scale[:, None], G / np.outer(scale, scale), Q * np.outer(scale, scale)
+    open_loop, reached = a, g
     for _ in range(_DOUBLINGS):
         lu = linalg.lu_factor(np.eye(len(a)) + g @ h)
         across, spread = linalg.lu_solve(lu, a), linalg.lu_solve(lu, g)
@@ -65,6 +69,8 @@ def riccati(A: Array, G: Array, Q: Array) -> Array:
         if not (np.isfinite(a).all() and np.isfinite(g).all() and np.isfinite(h).all()):
             break
         if linalg.norm(change) < _CONVERGED * linalg.norm(h):
+            if radius(linalg.solve(np.eye(len(h)) + reached @ h, open_loop)) > _GROWING:
+                break
             return np.asarray(h / np.outer(scale, scale))
     raise LinearisationRefusedError(
         "no stabilising solution: a mode that does not decay is not reached by the torques, or not seen by the readings"

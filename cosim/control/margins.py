@@ -1,4 +1,4 @@
-"""How far a loop of several inputs is from instability.
+"""How far a stable loop of several inputs is from instability.
 
     L = -K P at the plant's inputs,  S = (1 + L)^-1
 
@@ -19,6 +19,9 @@ from .responses import Complex
 
 _STEPS = (1.0, 0.25, 0.0625)
 """Of the logarithms of scalings."""
+
+_REAL = 1e-2
+"""Largest |imaginary/real| of a gain at rest, or at Nyquist's frequency, that is taken as real there."""
 
 _GAIN = 1e-4
 """Part of a norm for which no further scaling is tried."""
@@ -49,7 +52,10 @@ def loop_at_a_time(S: Complex) -> Complex:
 
 
 def margins(gain: Complex, frequencies: Array) -> Margins:
-    """Margins of one loop gain."""
+    """Margins of one gain of a stable loop, from next to rest to Nyquist's frequency.
+
+    A real pole leaves the circle at 1 or -1, where the gain is real without crossing the axis: both ends count.
+    """
     size, imaginary = np.log(np.abs(gain)), gain.imag
     across = np.flatnonzero(np.diff(np.sign(size)))
     share = size[across] / (size[across] - size[across + 1])
@@ -59,6 +65,8 @@ def margins(gain: Complex, frequencies: Array) -> Margins:
     real_axis = np.flatnonzero(np.diff(np.sign(imaginary)))
     share = imaginary[real_axis] / (imaginary[real_axis] - imaginary[real_axis + 1])
     real = gain.real[real_axis] + share * np.diff(gain.real)[real_axis]
+    ends = gain[[0, -1]]
+    real = np.concatenate([real, ends.real[np.abs(ends.imag) < _REAL * np.abs(ends.real)]])
     factors = -1.0 / real[real < 0.0]
     return Margins(
         float(crossover.max(initial=0.0)),
@@ -72,8 +80,8 @@ def margins(gain: Complex, frequencies: Array) -> Margins:
 def disk_margin(S: Complex) -> Array:
     """alpha at each frequency: 1/mu(S - 1/2) for diagonal uncertainty, exact for up to three loops.
 
-    mu is the least norm of D (S - 1/2) D^-1 over diagonal D, whose logarithm is sought along all diagonals by halving
-    steps; any D gives a bound on the safe side.
+    mu is the least norm of D (S - 1/2) D^-1 over diagonal D, whose logarithm is sought along all diagonals by ever
+    smaller steps; any D gives a bound on the safe side.
     """
     M = S - 0.5 * np.eye(S.shape[-1])
     ways = [np.array(way) for way in product((-1.0, 0.0, 1.0), repeat=S.shape[-1] - 1) if any(way)]

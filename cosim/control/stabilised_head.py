@@ -12,8 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import LinearisationRefusedError
 from ..report import EXPOSURE
 from .conditioning import Array
+from .folding import closure
 from .head_models import (
     FORCE,
     JOINT,
@@ -28,16 +30,17 @@ from .head_models import (
     sensor_responses,
 )
 from .margins import Margins, disk_margin, loop_at_a_time, margins, sensitivity
+from .noise import ModelNoise
 from .responses import Complex, density, jitter_of, response
 
 _SLOWEST = 0.01
 """Hz; slower motion counts for nothing within an exposure of a second."""
 
+_AT_REST = 1e-6
+"""Hz; where an integrator's gain is still finite."""
+
 _FINE = (3.0, 30.0)
 """Hz, where tripods and vortices resonate."""
-
-_NOISE_STATE = 1e-3
-"""How near to 1 a pole of the sensor's noise is left out of a loop's stability."""
 
 MOTION = slice(RATE.start, FORCE.stop)
 """What of the plant's outputs the sensor feels."""
@@ -129,9 +132,10 @@ def line_of_sight(jitter: Array) -> float:
 
 
 def grid(clocks: Clocks) -> Array:
-    """Frequencies (Hz) up to Nyquist's, denser where tripods resonate."""
+    """Frequencies (Hz) from next to rest to Nyquist's, denser where tripods resonate."""
     nyquist = 0.5 / clocks.period
-    return np.unique(np.concatenate([np.geomspace(_SLOWEST, 0.9995 * nyquist, 700), np.linspace(*_FINE, 200)]))
+    middle = np.geomspace(_SLOWEST, 0.9995 * nyquist, 700)
+    return np.unique(np.concatenate([[_AT_REST], middle, np.linspace(*_FINE, 200), [nyquist]]))
 
 
 def head_of(plant: PlantModel, sensor: SensorModel, clocks: Clocks, friction: Friction) -> Head:
@@ -207,17 +211,29 @@ def _noises(names: list[str]) -> dict[str, list[int]]:
     return found
 
 
-def radius(head: Head, controller: Controller) -> float:
-    """Largest magnitude of the closed loop's eigenvalues; those of the sensor's noise, which go on anyway, left out."""
-    p, s = head.plant.mean.system, head.sensor.noise.system
+def radius(head: Head, controller: Controller, plant: ModelNoise | None = None) -> float:
+    """Largest magnitude of the closed loop's eigenvalues, in the mean wind or about another point of the plant.
+
+    The states of the sensor that motion does not reach, those of its noise, are no part of the loop.
+    """
+    p, s = (plant or head.plant.mean).system, head.sensor.noise.system
     A, B, C, D, _ = controller
-    n, m = p.nstates, s.nstates
-    moved = s.B @ p.C[MOTION]
-    plant = np.block([[p.A, np.zeros((n, m))], [moved @ p.A, s.A]])
+    moved_by = closure(s.A != 0.0, np.any(s.B != 0.0, axis=1))
+    own, felt, read = s.A[np.ix_(moved_by, moved_by)], s.B[moved_by], s.C[:, moved_by]
+    n, m = p.nstates, len(own)
+    moved = felt @ p.C[MOTION]
+    open_loop = np.block([[p.A, np.zeros((n, m))], [moved @ p.A, own]])
     drive = np.vstack([p.B, moved @ p.B])
-    seen = np.block([[np.zeros((s.noutputs, n)), s.C], [p.C[JOINT], np.zeros((3, m))]])
-    poles = np.linalg.eigvals(np.block([[plant + drive @ D @ seen, drive @ C], [B @ seen, A]]))
-    own = np.linalg.eigvals(s.A)
-    for pole in own[np.abs(own) > 1.0 - _NOISE_STATE]:
-        poles = np.delete(poles, np.argmin(np.abs(poles - pole)))
+    seen = np.block([[np.zeros((s.noutputs, n)), read], [p.C[JOINT], np.zeros((3, m))]])
+    poles = np.linalg.eigvals(np.block([[open_loop + drive @ D @ seen, drive @ C], [B @ seen, A]]))
     return float(np.abs(poles).max())
+
+
+def check_gusts(head: Head, controller: Controller) -> None:
+    """Raise `LinearisationRefusedError` where a loop that is stable in the mean wind is not in its gusts."""
+    largest = max(radius(head, controller, gust) for gust in head.plant.gusts)
+    if largest >= 1.0:
+        raise LinearisationRefusedError(
+            f"the loop is unstable in gusts of one standard deviation (radius {largest:.7g}): choose a lower "
+            "plant.wind.speed or plant.wind.turbulence"
+        )

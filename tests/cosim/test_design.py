@@ -121,7 +121,7 @@ def test_files_are_written_whole_and_nothing_else(done: Done) -> None:
     systems = {f"{kind}_{SENSOR}.ssp" for kind in ("pid", "lqg")} | {f"held_{SENSOR}.ssp"}
     controllers = {f"{kind}_{SENSOR}.fmu" for kind in ("Pid", "Lqg")}
     pictures = {"design_overview.png", "design_loops.png"}
-    assert names == {"design.csv", *pictures, *systems, *controllers}
+    assert names == {"design.csv", "runs", *pictures, *systems, *controllers}
     assert all((done.out / picture).read_bytes().startswith(PNG) for picture in pictures)
 
 
@@ -150,9 +150,11 @@ def test_written_system_runs_by_itself(done: Done, tmp_path: Path) -> None:
         (["--set", "sensor.ideal=true"], "sensor.ideal is not free in a design: ask for --sensor ideal"),
         (["--set", "sensor.processor.period=0.1"], "it follows from the sensor's clock"),
         (
-            ["--stop", "5"],
-            "--stop 5: jitter is counted in exposures of 1 s, from 8 s after the sensor's alignment; choose",
+            ["--stop", "11"],
+            "--stop 11: jitter is counted in exposures of 1 s, from 8 s after the sensor's alignment of",
         ),
+        (["--stop", "0"], "--stop 0: jitter"),
+        (["--stop", "nan"], "--stop nan: jitter"),
         (["--set", "camera.zoom=2"], "camera.zoom: a design has the components plant and sensor"),
         (["--set", "plant.wind.speed=strong"], "plant.wind.speed = strong: a design takes numbers"),
         (["--set", "plant.wind.sped=3"], "wind.speed"),

@@ -80,6 +80,11 @@ def test_mode_that_no_torque_reaches_and_does_not_decay_is_refused() -> None:
         riccati(np.diag([1.1, 0.5]), np.diag([0.0, 1.0]), np.eye(2))
 
 
+def test_mode_that_grows_unseen_is_refused() -> None:
+    with pytest.raises(LinearisationRefusedError, match="not seen"):
+        riccati(np.diag([1.1, 0.5]), np.eye(2), np.diag([0.0, 1.0]))
+
+
 def test_poles_of_the_loop_are_those_of_regulator_and_estimator() -> None:
     p, (K, a, b), correction, observer = designed()
     F, G, H, J = observer.controller()

@@ -34,6 +34,14 @@ def test_conditionally_stable_loop_has_a_margin_downwards() -> None:
     assert margins(loop(S), F).gain_up == np.inf
 
 
+def test_poles_that_leave_through_one_and_minus_one_are_margins_too() -> None:
+    """k/(z - 1.1) has its pole at 1.1 - k: stable for 0.1 < k < 2.1."""
+    f = np.concatenate([[1e-6], np.geomspace(1e-2, 49.9, 200), [50.0]])
+    found = margins(1.0 / (np.exp(2j * np.pi * f * 0.01) - 1.1), f)
+    assert found.gain_down == pytest.approx(0.1, rel=1e-6)
+    assert found.gain_up == pytest.approx(2.1, rel=1e-6)
+
+
 def test_loop_without_a_crossing_has_all_margins() -> None:
     found = margins(0.1 / (1.0 + S), F)
     assert found[:4] == (0.0, np.pi, np.inf, 0.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import control
 import numpy as np
 import pytest
@@ -96,6 +98,15 @@ def test_nyquist_agrees_with_the_poles(head: Head, controller: Controller, loop:
     assert found[0] < 1.0 < found[1]
 
 
+def test_all_loops_at_once_stand_the_gains_of_the_disk_margin(head: Head, controller: Controller, loop: Loop) -> None:
+    from attitude_fmu.cosim.control.margins import gain_of
+
+    inside = gain_of(0.99 * float(loop.disk.min()))
+    for signs in product((-1.0, 1.0), repeat=3):
+        size = inside ** np.array(signs)[:, None]
+        assert radius(head, controller._replace(C=size * controller.C, D=size * controller.D)) < 1.0
+
+
 def test_disk_margin_lies_within_each_margin_of_one_loop(loop: Loop) -> None:
     from attitude_fmu.cosim.control.margins import gain_of, phase_of
 
@@ -171,11 +182,10 @@ def test_reduced_lqg_has_the_margin_and_costs_two_per_cent(
 ) -> None:
     monkeypatch.setattr(head_lqg, "_ORDERS", range(30, 71, 10))
     designed = head_lqg.lqg_design(head, friction)
-    # chosen at every third frequency
-    assert designed.loop.disk.min() > 0.97 * head_lqg.DISK
+    assert designed.loop.disk.min() >= head_lqg.DISK
     assert designed.loop.radius < 1.0
-    assert designed.order < len(designed.whole.head.plant.mean.system.A) + len(head.sensor.noise.system.A)
-    assert line_of_sight(designed.loop.jitter()) < 1.03 * line_of_sight(designed.whole.jitter())
+    assert len(designed.controller.A) < len(head.plant.mean.system.A) + len(head.sensor.noise.system.A)
+    assert line_of_sight(designed.loop.jitter()) < 1.02 * line_of_sight(designed.whole.jitter())
 
 
 def test_no_lqg_is_refused_with_the_best_that_there_is(
