@@ -29,7 +29,7 @@ _MOST_UNITS, _MOST_STATES = 4, 6
 _STATE_STALE = 4
 _CUT = 800
 _NAMES = ("unit", "100 % of %s%n", "größer", "x" * 3000)
-_TOLERATED = ("ran away", "too short a period", "the derivative of")
+_TOLERATED = ("ran away", "too short a period", "the derivative of", "(allowed: ")
 _STAGE_AFTER = {
     "enter": ("EnterInitializationMode", INITIALISING),
     "leave": ("ExitInitializationMode", STEPPING),
