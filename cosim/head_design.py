@@ -55,6 +55,9 @@ SIGNALS = (
 )
 """What controllers may read: gyros, accelerometers, encoders."""
 
+_DIGITS = 12
+"""Of an operating point's readings, the rest is what solving for it leaves."""
+
 TORQUE_LIMIT = Parameters().torque_limit.yaw
 """N.m; of the motors."""
 
@@ -174,7 +177,7 @@ def _exported(controller: Controller, point: OperatingPoint, path: Path) -> tupl
         units={name: unit for name, unit in UNITS.items() if any(one.startswith(name) for one in (*inputs, TORQUE))},
         limits=TORQUE_LIMIT,
         anti_windup=anti_windup,
-        u0=at[used].tolist(),
+        u0=np.round(at[used], _DIGITS).tolist(),
         y0=list(point.inputs.motor_torque),
     )
     return path, inputs
