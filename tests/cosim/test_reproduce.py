@@ -26,7 +26,7 @@ from attitude_fmu.cosim.recording import Results
 from attitude_fmu.cosim.system import Component, System
 
 SEEDS = 4
-MANY = 2 * (os.cpu_count() or 1) + 4
+MANY = 10 * (os.cpu_count() or 1) + 10
 """More than run and wait in the processes when the first is done: an interrupt leaves some."""
 
 
