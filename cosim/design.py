@@ -27,7 +27,7 @@ from .errors import ResultsError, SystemRefusedError
 from .interface import Value, read_interface
 from .jobs import Job, portable, run_jobs
 from .recording import Results
-from .report import EXPOSURE, Jitter, aligned_at, jitter
+from .report import AXES, EXPOSURE, Jitter, aligned_at, jitter
 from .scenarios import WIND_SPEED
 from .ssp import write_ssp
 from .system import Component, ParameterSet, System, connect
@@ -38,9 +38,8 @@ SENSORS = ("ADXRS450_ADXL355", "ADIS16354_150", IDEAL)
 """Of the two papers, and one without errors."""
 
 PLANT, HOLD, SENSOR = "TripodGimbal", "GimbalController", "AttitudeSensor"
-_AXES = ("yaw", "pitch", "roll")
-_JOINTS = [f"{group}.{axis}" for group in ("joint", "joint_rate") for axis in _AXES]
-_TORQUES = [f"motor_torque.{axis}" for axis in _AXES]
+_JOINTS = [f"{group}.{axis}" for group in ("joint", "joint_rate") for axis in AXES]
+_TORQUES = [f"motor_torque.{axis}" for axis in AXES]
 
 _SETTLING = 8.0
 """s from the end of the alignment until the loop is taken as settled."""
